@@ -1,0 +1,2 @@
+// SPDX-License-Identifier: MIT
+// Stands in until the folder has a source of its own.
