@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: MIT
+#include "decoders/npy.hpp"
+
+#include <unistd.h>
+
+#include <bit>
+#include <cerrno>
+#include <cstring>
+
+#include "container/base/limits.hpp"
+
+namespace relit::decoders {
+namespace {
+
+static_assert(std::endian::native == std::endian::little,
+              "arrays are written as they lie in memory");
+
+constexpr char kMagic[] = {'\x93', 'N', 'U', 'M', 'P', 'Y', 1, 0};
+constexpr std::uint64_t kMaxElements = 1ull << 34;
+
+Unexpected io_error(const std::filesystem::path& path, const char* action) {
+  return fail(ErrorCode::kIo, path.string() + ": cannot " + action + ": " + std::strerror(errno));
+}
+
+std::string header(const char* descr, std::span<const std::uint64_t> shape) {
+  std::string text = std::string("{'descr': '") + descr + "', 'fortran_order': False, 'shape': (";
+  for (const std::uint64_t side : shape) text += std::to_string(side) + ", ";
+  text += "), }";
+  // The format wants the data to start at a multiple of 64 bytes.
+  const std::size_t unpadded = sizeof kMagic + 2 + text.size() + 1;
+  text.append((64 - unpadded % 64) % 64, ' ');
+  return text + '\n';
+}
+
+}  // namespace
+
+Result<NpyWriter> NpyWriter::create(const std::filesystem::path& path, Type type,
+                                    std::span<const std::uint64_t> shape) {
+  NpyWriter writer;
+  writer.type_ = type;
+  writer.remaining_ = shape.empty() ? 0 : 1;
+  for (const std::uint64_t side : shape) {
+    if (side != 0 && writer.remaining_ > kMaxElements / side) {
+      return fail(ErrorCode::kLimit, path.string() + ": an array of more than 2^34 elements");
+    }
+    writer.remaining_ *= side;
+  }
+  if (writer.remaining_ == 0) return fail(ErrorCode::kInvalid, path.string() + ": an empty array");
+  writer.target_ = path;
+  writer.temporary_ = path;
+  writer.temporary_ += "." + std::to_string(::getpid()) + ".part";
+  writer.file_.reset(std::fopen(writer.temporary_.c_str(), "wb"));
+  if (!writer.file_) return io_error(path, "be written");
+  const std::string text = header(type == Type::kFloat32 ? "<f4" : "|u1", shape);
+  const std::uint8_t length[2] = {static_cast<std::uint8_t>(text.size() & 0xff),
+                                  static_cast<std::uint8_t>(text.size() >> 8)};
+  std::FILE* file = writer.file_.get();
+  if (std::fwrite(kMagic, sizeof kMagic, 1, file) != 1 || std::fwrite(length, 2, 1, file) != 1 ||
+      std::fwrite(text.data(), text.size(), 1, file) != 1) {
+    return io_error(path, "be written");
+  }
+  return writer;
+}
+
+NpyWriter::~NpyWriter() {
+  if (!file_) return;
+  file_.reset();
+  std::error_code ignored;
+  std::filesystem::remove(temporary_, ignored);
+}
+
+Status NpyWriter::write_bytes(const void* data, std::uint64_t elements, Type type,
+                              std::uint64_t size) {
+  if (type != type_ || elements > remaining_) {
+    return fail(ErrorCode::kInvalid, target_.string() + ": elements that its shape does not hold");
+  }
+  if (elements != 0 && std::fwrite(data, size, elements, file_.get()) != elements) {
+    return io_error(target_, "be written");
+  }
+  remaining_ -= elements;
+  return {};
+}
+
+Status NpyWriter::write(std::span<const float> values) {
+  return write_bytes(values.data(), values.size(), Type::kFloat32, sizeof(float));
+}
+
+Status NpyWriter::write(std::span<const std::uint8_t> values) {
+  return write_bytes(values.data(), values.size(), Type::kUint8, 1);
+}
+
+Status NpyWriter::commit() {
+  if (remaining_ != 0) {
+    return fail(ErrorCode::kInvalid,
+                target_.string() + ": " + std::to_string(remaining_) + " elements are missing");
+  }
+  if (std::fflush(file_.get()) != 0 || ::fsync(::fileno(file_.get())) != 0) {
+    return io_error(target_, "be written");
+  }
+  file_.reset();
+  std::error_code error;
+  std::filesystem::rename(temporary_, target_, error);
+  if (error) {
+    std::error_code ignored;
+    std::filesystem::remove(temporary_, ignored);
+    return fail(ErrorCode::kIo, target_.string() + ": cannot be written: " + error.message());
+  }
+  return {};
+}
+
+namespace {
+
+// The text of one key of the header's dictionary, up to the next comma outside parentheses.
+Result<std::string> entry(const std::string& text, const std::string& key,
+                          const std::string& where) {
+  const std::size_t at = text.find("'" + key + "':");
+  if (at == std::string::npos)
+    return fail(ErrorCode::kCorrupt, where + ": no '" + key + "' in its header");
+  const std::size_t begin = at + key.size() + 3;
+  const std::size_t open = text.find_first_not_of(' ', begin);
+  const std::size_t end =
+      open != std::string::npos && text[open] == '(' ? text.find(')', open) : text.find(',', begin);
+  if (end == std::string::npos) return fail(ErrorCode::kCorrupt, where + ": its header breaks off");
+  return text.substr(begin, end - begin + 1);
+}
+
+Result<std::vector<std::uint64_t>> parse_shape(const std::string& text, const std::string& where) {
+  std::vector<std::uint64_t> shape;
+  std::uint64_t elements = 1;
+  for (std::size_t i = 0; i < text.size();) {
+    if (text[i] < '0' || text[i] > '9') {
+      ++i;
+      continue;
+    }
+    std::uint64_t side = 0;
+    for (; i < text.size() && text[i] >= '0' && text[i] <= '9'; ++i) {
+      side = side * 10 + static_cast<std::uint64_t>(text[i] - '0');
+      if (side > kMaxElements) return fail(ErrorCode::kLimit, where + ": its shape is too large");
+    }
+    if (side == 0 || elements > kMaxElements / side) {
+      return fail(ErrorCode::kLimit, where + ": its shape is empty or too large");
+    }
+    elements *= side;
+    shape.push_back(side);
+  }
+  return shape;
+}
+
+}  // namespace
+
+Result<NpyArray> read_npy(const std::filesystem::path& path) {
+  const std::string where = path.string();
+  std::unique_ptr<std::FILE, void (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"),
+                                                        [](std::FILE* f) { std::fclose(f); });
+  if (!file) return io_error(path, "be read");
+  std::uint8_t start[10];
+  if (std::fread(start, sizeof start, 1, file.get()) != 1 || std::memcmp(start, kMagic, 6) != 0 ||
+      start[6] != 1) {
+    return fail(ErrorCode::kCorrupt, where + ": not a version 1 .npy file");
+  }
+  std::string text(static_cast<std::size_t>(start[8] | start[9] << 8), '\0');
+  if (text.empty() || std::fread(text.data(), text.size(), 1, file.get()) != 1) {
+    return fail(ErrorCode::kTruncated, where + ": ends in its header");
+  }
+  RELIT_ASSIGN(const std::string type, entry(text, "descr", where));
+  RELIT_ASSIGN(const std::string order, entry(text, "fortran_order", where));
+  RELIT_ASSIGN(const std::string shape, entry(text, "shape", where));
+  const bool bytes = type.find("|u1") != std::string::npos;
+  if ((!bytes && type.find("<f4") == std::string::npos) ||
+      order.find("False") == std::string::npos) {
+    return fail(ErrorCode::kUnsupported,
+                where + ": only C-ordered float32 and uint8 arrays are read");
+  }
+  NpyArray array;
+  RELIT_ASSIGN(array.shape, parse_shape(shape, where));
+  std::uint64_t elements = 1;
+  for (const std::uint64_t side : array.shape) elements *= side;
+  std::error_code error;
+  const std::uint64_t expected =
+      sizeof start + text.size() + elements * (bytes ? 1 : sizeof(float));
+  if (std::filesystem::file_size(path, error) != expected || error) {
+    return fail(ErrorCode::kTruncated,
+                where + ": its shape needs " + std::to_string(expected) + " bytes");
+  }
+  array.values.resize(elements);
+  if (!bytes) {
+    if (std::fread(array.values.data(), sizeof(float), elements, file.get()) != elements)
+      return io_error(path, "be read");
+    return array;
+  }
+  std::vector<std::uint8_t> raw(elements);
+  if (std::fread(raw.data(), 1, elements, file.get()) != elements) return io_error(path, "be read");
+  array.values.assign(raw.begin(), raw.end());
+  return array;
+}
+
+}  // namespace relit::decoders
