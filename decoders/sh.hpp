@@ -26,7 +26,7 @@ void evaluate_sh(int order, const glm::vec3& direction, std::span<float> y);
 /// SH coefficients L_n of incident radiance in model space, RGB; order 0..3.
 struct Light {
   std::vector<std::array<double, 3>> sh;  ///< 1, 4, 9 or 16 rows
-  [[nodiscard]] int order() const;        ///< of `sh`
+  [[nodiscard]] int order() const;        ///< of `sh`; -1 where the number of rows is none of these
 };
 
 /// An equirectangular picture of linear radiance. Row 0 is +Y; pixel (x, y) is the direction
@@ -37,11 +37,16 @@ struct Environment {
   std::vector<float> rgb;  ///< height × width × 3
 };
 
+/// Exchanges the axes y and z: L(x, y, z) becomes L(x, z, y). It is its own inverse. The harmonics'
+/// polar axis is z, so what goes on about +Y is simple only between two such exchanges.
+void exchange_y_and_z(Light& light);
+
 /// Projects with the exact solid angle of every pixel and the mean of Y_n over it; a constant image of
-/// radiance 1 gives L_0 = √(4π) to 1e-12. Errors: kInvalid for non-finite or negative pixels (says where).
+/// radiance 1 gives L_0 = √(4π) to 1e-12. Errors: kInvalid for non-finite or negative pixels (says
+/// where) and for a size that `rgb` does not have, kLimit for sides beyond limits::kImageSide.
 [[nodiscard]] Result<Light> project_environment(const Environment& environment, int order);
 
-/// Turns the light about +Y by `angle_rad`, added to φ.
+/// Turns the light about +Y by `angle_rad`, added to φ: what shone from φ shines from φ + angle_rad.
 void rotate_light_y(Light& light, double angle_rad);
 
 /// Multiplies band l by (1 + cos(πl/5)) / 2, against ringing.
