@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: MIT
+#include "bake_minimal/coding_options.hpp"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <string_view>
+
+#include "container/base/limits.hpp"
+
+namespace relit::bake {
+namespace {
+
+using container::Chroma;
+
+struct CodecTraits {
+  std::string_view name;
+  bool lossy;
+  bool lossless;
+  bool ten_bits;
+  bool only_420;
+  double crf_min, crf_max, crf_default;
+};
+
+constexpr std::array<CodecTraits, 6> kCodecs = {{
+    {"h264", true, true, true, false, -12, 51, 18},
+    {"hevc", true, true, true, false, 0, 51, 18},
+    {"mpeg4", true, false, false, true, 0, 51, 13},
+    {"ffv1", false, true, true, false, 0, 0, 0},
+    {"vp9", true, true, true, false, 0, 63, 24},
+    {"av1", true, false, true, false, 0, 63, 24},
+}};
+
+Unexpected invalid(std::string message) { return fail(ErrorCode::kInvalid, std::move(message)); }
+
+Status check_numbers(const CodingOptions& o, const CodecTraits& codec) {
+  if (*o.bit_depth != 8 && *o.bit_depth != 10) {
+    return invalid("--bit-depth is 8 or 10, not " + std::to_string(*o.bit_depth));
+  }
+  if (!std::isfinite(*o.crf) || *o.crf < codec.crf_min || *o.crf > codec.crf_max) {
+    return invalid("--crf for " + o.codec + " is a number from " +
+                   std::to_string(static_cast<int>(codec.crf_min)) + " to " +
+                   std::to_string(static_cast<int>(codec.crf_max)));
+  }
+  if (o.codec == "h264" && *o.bit_depth == 8 && *o.crf < 0) {
+    return invalid("--crf below 0 needs --bit-depth 10");
+  }
+  if (o.exponent_block != 0 &&
+      (o.exponent_block < 1 || o.exponent_block > 32 ||
+       !std::has_single_bit(static_cast<unsigned>(o.exponent_block)))) {
+    return invalid("--exponent-block is 1, 2, 4, 8, 16, 32, or 0 for none, not " +
+                   std::to_string(o.exponent_block));
+  }
+  if (o.exponent_hold < 0) return invalid("--exponent-hold is a number of frames, or 0");
+  const auto longest = static_cast<int>(limits::kFramesPerSegment);
+  if (o.segment_frames < 1 || o.segment_frames > longest) {
+    return invalid("a segment has 1 to " + std::to_string(longest) + " frames, not " +
+                   std::to_string(o.segment_frames));
+  }
+  if (o.reference_frames < 1 || o.reference_frames > 16) {
+    return invalid("reference frames are 1 to 16, not " + std::to_string(o.reference_frames));
+  }
+  if (o.threads < 1) return invalid("at least one thread is needed");
+  return {};
+}
+
+}  // namespace
+
+CodingOptions paper_options() {
+  CodingOptions options;
+  options.codec = "mpeg4";
+  options.bit_depth = 8;
+  options.chroma = Chroma::k420;
+  options.exponent_block = 1;
+  options.exponent_hold = 1;
+  options.layout = Layout::kGrid;
+  return options;
+}
+
+Result<CodingOptions> resolve(CodingOptions o) {
+  const auto codec = std::find_if(kCodecs.begin(), kCodecs.end(),
+                                  [&](const CodecTraits& t) { return t.name == o.codec; });
+  if (codec == kCodecs.end()) {
+    return invalid("--codec " + o.codec +
+                   " is not known; h264, hevc, mpeg4, ffv1, vp9 and av1 are");
+  }
+  if (!codec->lossy) o.lossless = true;
+  if (o.lossless && !codec->lossless) {
+    return invalid("--codec " + o.codec + " cannot be lossless; h264, hevc, vp9 and ffv1 can");
+  }
+  if (!o.bit_depth) o.bit_depth = codec->ten_bits && o.exponent_block == 0 ? 10 : 8;
+  if (!o.chroma) o.chroma = o.lossless ? Chroma::k444 : Chroma::k420;
+  if (!o.crf || o.lossless) o.crf = codec->crf_default;
+  if (o.preset.empty()) {
+    if (o.codec == "h264") o.preset = "veryslow";
+    if (o.codec == "hevc") o.preset = "slow";
+    if (o.codec == "vp9" || o.codec == "av1") o.preset = "4";
+  }
+  if (*o.bit_depth == 10 && !codec->ten_bits) {
+    return invalid("--codec " + o.codec + " has 8 bits only: use --bit-depth 8, or --codec h264");
+  }
+  if (codec->only_420 && *o.chroma != Chroma::k420) {
+    return invalid("--codec " + o.codec + " has 4:2:0 only: use --chroma 420, or --codec h264");
+  }
+  if (o.lossless && *o.chroma == Chroma::k420) {
+    return invalid(std::string(codec->lossy ? "--lossless" : "--codec ffv1, which is lossless,") +
+                   " needs --chroma 444 or luma: 4:2:0 averages colour, and rounded YCoCg does not "
+                   "give back R, G and B");
+  }
+  RELIT_TRY(check_numbers(o, *codec));
+  return o;
+}
+
+}  // namespace relit::bake

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "bake_minimal/coding_options.hpp"
+#include "container/base/result.hpp"
+#include "container/records.hpp"
+
+/// Which planes a light-map model has, where they lie in which pictures, and their columns of M.
+namespace relit::bake {
+
+/// The three planes, or one, into which the RGB of a coefficient turns.
+enum class Basis : std::uint8_t { kYCoCg, kGbr, kLuma };
+
+/// The basis of resolved options.
+[[nodiscard]] Basis basis_of(const CodingOptions& options);
+/// 3 or 1.
+[[nodiscard]] int component_count(Basis basis);
+
+/// Y = (R+2G+B)/4, Co = (R−B)/2, Cg = (2G−R−B)/4; G, B, R; or (R+G+B)/3, which is the least squares
+/// best where all channels count alike, as they do under white light. Exact inverse of the columns of
+/// M where there is one: R = Y+Co−Cg, G = Y+Cg, B = Y−Co−Cg.
+[[nodiscard]] std::array<double, 3> to_components(Basis basis, const std::array<double, 3>& rgb);
+[[nodiscard]] std::array<double, 3> to_rgb(Basis basis, const std::array<double, 3>& components);
+
+/// One layer before it is coded. `record` lacks scales and private data of the codecs.
+struct LayerPlan {
+  container::LayerRecord record;
+  std::vector<int> coefficients;  ///< planes [i·components, (i+1)·components) show coefficients[i]
+};
+
+struct LayoutIds {
+  std::uint32_t model_id = 0;
+  std::uint32_t first_layer_id = 0;
+  std::uint32_t first_track_id = 0;  ///< a layer takes one, or two with exponents, in order
+};
+
+/// Lays the planes of an order-N model out: tiles of the light map's size, padded to multiples of 16,
+/// in rows (as long as 2048 samples allow) by band, or as the grid. Deterministic.
+/// Errors: kLimit when a picture would be too large, kInvalid for a bad order or size.
+[[nodiscard]] Result<std::vector<LayerPlan>> plan_layers(int order, int width, int height,
+                                                         const CodingOptions& resolved,
+                                                         const LayoutIds& ids);
+
+/// 127 or 511: the largest |m − M₀| that a writer emits.
+[[nodiscard]] constexpr int mantissa_top(int bit_depth) { return bit_depth == 8 ? 127 : 511; }
+[[nodiscard]] constexpr int mantissa_zero(int bit_depth) { return bit_depth == 8 ? 128 : 512; }
+[[nodiscard]] constexpr int exponent_zero(int bit_depth) { return bit_depth == 8 ? 135 : 137; }
+/// 9 or 11: with it a step is the smallest normal number.
+[[nodiscard]] constexpr int exponent_least(int bit_depth) { return bit_depth == 8 ? 9 : 11; }
+
+/// Largest error that quantisation can cause in T[coefficient, channel] where the planes are coded
+/// without loss at full resolution: Σ_k |M[n,c,k]| · scale_k · 2^(E−E₀) / 2. `exponent` is the block's
+/// E; ignored without exponents. With E = 0 the bound is 0. Not counted: the rounding of the sum to
+/// float, and what a luma-only model drops.
+[[nodiscard]] double quantiser_bound(std::span<const container::LayerRecord> layers, int coefficient,
+                                     int channel, int exponent = 0);
+
+}  // namespace relit::bake

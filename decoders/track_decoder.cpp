@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "container/base/limits.hpp"
+#include "decoders/plane_decoder.hpp"
+
+namespace relit::decoders {
+
+Result<TrackDecoder> TrackDecoder::open(const VideoFormat& format, int threads) {
+  RELIT_ASSIGN(VideoDecoder video, VideoDecoder::open(format, threads));
+  TrackDecoder decoder(std::move(video));
+  decoder.track_id_ = format.track_id;
+  return decoder;
+}
+
+Status TrackDecoder::add_chunk(const container::SegmentRecord& segment,
+                               container::ChunkRecord chunk) {
+  const std::string where = "track " + std::to_string(track_id_) + ", segment " +
+                            std::to_string(segment.index) + ": ";
+  if (segment.frame_count == 0 || segment.frame_count > limits::kFramesPerSegment ||
+      segment.first_frame > limits::kFrames || chunk.packets.size() > limits::kPacketsPerChunk) {
+    return fail(ErrorCode::kLimit, where + "too many frames or packets, or none");
+  }
+  Chunk stored;
+  stored.end_frame = segment.first_frame + segment.frame_count;
+  for (const container::Packet& packet : chunk.packets) {
+    if (packet.size > chunk.data.size() || packet.offset > chunk.data.size() - packet.size) {
+      return fail(ErrorCode::kCorrupt, where + "a packet reaches outside its chunk");
+    }
+    if (packet.pts < static_cast<std::int64_t>(segment.first_frame) ||
+        packet.pts >= static_cast<std::int64_t>(stored.end_frame)) {
+      return fail(ErrorCode::kCorrupt, where + "a packet of frame " + std::to_string(packet.pts) +
+                                           " is outside the segment's frames");
+    }
+    stored.shown.push_back(packet.pts);
+  }
+  std::sort(stored.shown.begin(), stored.shown.end());
+  if (std::adjacent_find(stored.shown.begin(), stored.shown.end()) != stored.shown.end()) {
+    return fail(ErrorCode::kCorrupt, where + "two packets of one frame");
+  }
+  const auto next = chunks_.lower_bound(segment.first_frame);
+  if ((next != chunks_.end() && next->first != segment.first_frame &&
+       next->first < stored.end_frame) ||
+      (next != chunks_.begin() && std::prev(next)->second.end_frame > segment.first_frame)) {
+    return fail(ErrorCode::kCorrupt, where + "its frames overlap those of another segment");
+  }
+  if (segment_ == segment.first_frame) segment_.reset();
+  stored.record = std::move(chunk);
+  chunks_.insert_or_assign(segment.first_frame, std::move(stored));
+  return {};
+}
+
+TrackDecoder::Chunks::const_iterator TrackDecoder::find(std::uint64_t frame) const {
+  auto it = chunks_.upper_bound(frame);
+  if (it == chunks_.begin()) return chunks_.end();
+  --it;
+  return frame < it->second.end_frame ? it : chunks_.end();
+}
+
+bool TrackDecoder::has_segment_of(std::uint64_t frame) const { return find(frame) != chunks_.end(); }
+
+void TrackDecoder::restart(std::uint64_t first_frame) {
+  // Every segment is drained to its end or given up, so the decoder always starts at a key packet.
+  if (segment_ || next_packet_ > 0) decoder_.flush();
+  segment_ = first_frame;
+  next_packet_ = 0;
+  drained_ = false;
+  skipping_ = false;
+  damage_.reset();
+  current_.clear();
+  ahead_.clear();
+}
+
+void TrackDecoder::note_damage(Error error) {
+  skipping_ = true;
+  if (!damage_) damage_ = std::move(error);
+}
+
+void TrackDecoder::feed(const Chunk& chunk) {
+  const auto& packets = chunk.record.packets;
+  // Damage ends what the codec can be trusted with: packets up to the next key packet are left out,
+  // and the pictures that they would have shown are reported as lost.
+  while (next_packet_ < packets.size() && skipping_ && !packets[next_packet_].key) ++next_packet_;
+  if (next_packet_ == packets.size()) {
+    if (Status drained = decoder_.drain(); !drained) note_damage(std::move(drained).error());
+    drained_ = true;
+    return;
+  }
+  const container::Packet& packet = packets[next_packet_++];
+  if (next_packet_ == 1 && !packet.key) {
+    note_damage({ErrorCode::kCorrupt, "track " + std::to_string(track_id_) + ", frame " +
+                                          std::to_string(packet.pts) +
+                                          ": the segment does not begin with a key packet"});
+    return;
+  }
+  skipping_ = false;
+  const auto bytes = std::span(chunk.record.data)
+                         .subspan(static_cast<std::size_t>(packet.offset),
+                                  static_cast<std::size_t>(packet.size));
+  if (Status sent = decoder_.send(bytes, packet.pts, packet.key); !sent) {
+    note_damage(std::move(sent).error());
+  }
+}
+
+void TrackDecoder::advance(const Chunk& chunk) {
+  ahead_.clear();
+  // Each turn takes a packet, a picture or an error; a decoder that only ever fails while draining
+  // would not end by itself.
+  for (int failures = 0; failures < 64;) {
+    Result<VideoDecoder::Received> received = decoder_.receive(ahead_);
+    if (!received) {
+      ++failures;
+      note_damage(std::move(received).error());
+      continue;
+    }
+    if (*received == VideoDecoder::Received::kFrame) {
+      const std::int64_t after = current_.empty() ? -1 : current_.pts();
+      const bool known = std::binary_search(chunk.shown.begin(), chunk.shown.end(), ahead_.pts());
+      if (known && ahead_.pts() > after) return;
+      note_damage({ErrorCode::kCorrupt, "track " + std::to_string(track_id_) +
+                                            ": a picture with the time stamp of none of the packets, "
+                                            "or out of order, after frame " +
+                                            std::to_string(after)});
+      ahead_.clear();
+      continue;
+    }
+    if (*received == VideoDecoder::Received::kEnd || drained_) return;
+    feed(chunk);
+  }
+  ahead_.clear();
+}
+
+Result<const VideoFrame*> TrackDecoder::picture(std::uint64_t frame) {
+  const std::string where =
+      "track " + std::to_string(track_id_) + ", frame " + std::to_string(frame) + ": ";
+  const auto found = find(frame);
+  if (found == chunks_.end()) {
+    return fail(ErrorCode::kNotFound, where + "its segment is not here");
+  }
+  const Chunk& chunk = found->second;
+  const auto wanted = static_cast<std::int64_t>(frame);
+  const auto after = std::upper_bound(chunk.shown.begin(), chunk.shown.end(), wanted);
+  if (after == chunk.shown.begin()) {
+    return fail(ErrorCode::kCorrupt, where + "no packet at or before it in its segment");
+  }
+  const std::int64_t expected = *std::prev(after);
+  if (segment_ != found->first || (!current_.empty() && current_.pts() > expected)) {
+    restart(found->first);
+  }
+  while (current_.empty() || current_.pts() < expected) {
+    if (ahead_.empty()) advance(chunk);
+    if (ahead_.empty() || ahead_.pts() > expected) break;
+    current_ = std::move(ahead_);
+    ahead_.clear();
+  }
+  if (current_.empty() || current_.pts() != expected) {
+    return fail(ErrorCode::kCorrupt,
+                where + "lost" + (damage_ ? " (" + damage_->message + ")" : ""));
+  }
+  return &current_;
+}
+
+void TrackDecoder::forget_before(std::uint64_t frame) {
+  while (!chunks_.empty() && chunks_.begin()->second.end_frame <= frame) {
+    if (segment_ == chunks_.begin()->first) segment_.reset();
+    chunks_.erase(chunks_.begin());
+  }
+}
+
+}  // namespace relit::decoders
