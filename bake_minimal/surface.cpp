@@ -35,18 +35,16 @@ int wrapped(int i, int size, container::Wrap mode) {
   return ((i % size) + size) % size;
 }
 
-// One fetch: linear RGB with straight alpha; `srgb` decodes the colour channels.
-glm::vec4 texel(const Image& image, int x, int y, bool srgb) {
+// One fetch: linear RGB with straight alpha.
+glm::vec4 texel(const Image& image, int x, int y) {
   const std::uint8_t* p =
       &image.rgba[4 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) +
                        static_cast<std::size_t>(x))];
-  const float alpha = static_cast<float>(p[3]) / 255.0f;
-  if (!srgb) return glm::vec4(p[0], p[1], p[2], 0.0f) / 255.0f + glm::vec4(0, 0, 0, alpha);
   const auto& table = srgb_table();
-  return {table[p[0]], table[p[1]], table[p[2]], alpha};
+  return {table[p[0]], table[p[1]], table[p[2]], static_cast<float>(p[3]) / 255.0f};
 }
 
-glm::vec4 sample(const Image& image, glm::vec2 uv, const Surface& surface, bool srgb) {
+glm::vec4 sample(const Image& image, glm::vec2 uv, const Surface& surface) {
   // Coordinates beyond ±1e6 have no texel to speak of, and would overflow the integers.
   uv = glm::clamp(uv, glm::vec2(-1e6f), glm::vec2(1e6f));
   uv.x -= surface.wrap_u == container::Wrap::kRepeat ? std::floor(uv.x) : 0.0f;
@@ -57,31 +55,22 @@ glm::vec4 sample(const Image& image, glm::vec2 uv, const Surface& surface, bool 
   const float fx = uv.x * static_cast<float>(image.width);
   const float fy = uv.y * static_cast<float>(image.height);
   if (!surface.linear_filter) {
-    return texel(image, u(static_cast<int>(std::floor(fx))), v(static_cast<int>(std::floor(fy))),
-                 srgb);
+    return texel(image, u(static_cast<int>(std::floor(fx))), v(static_cast<int>(std::floor(fy))));
   }
   const float x = std::floor(fx - 0.5f), y = std::floor(fy - 0.5f);
   const float tx = fx - 0.5f - x, ty = fy - 0.5f - y;
   const int x0 = static_cast<int>(x), y0 = static_cast<int>(y);
-  const glm::vec4 top =
-      glm::mix(texel(image, u(x0), v(y0), srgb), texel(image, u(x0 + 1), v(y0), srgb), tx);
+  const glm::vec4 top = glm::mix(texel(image, u(x0), v(y0)), texel(image, u(x0 + 1), v(y0)), tx);
   const glm::vec4 bottom =
-      glm::mix(texel(image, u(x0), v(y0 + 1), srgb), texel(image, u(x0 + 1), v(y0 + 1), srgb), tx);
+      glm::mix(texel(image, u(x0), v(y0 + 1)), texel(image, u(x0 + 1), v(y0 + 1)), tx);
   return glm::mix(top, bottom, ty);
 }
 
 }  // namespace
 
-glm::vec4 surface_albedo(const Surface& surface, glm::vec2 uv, glm::vec2 metallic_uv,
-                         glm::vec4 color) {
-  glm::vec4 albedo = glm::vec4(surface.base_color, surface.alpha) * color;
-  if (surface.image != nullptr) albedo *= sample(*surface.image, uv, surface, true);
-  if (surface.metallic_image != nullptr) {
-    const float metal =
-        surface.metallic * sample(*surface.metallic_image, metallic_uv, surface, false).z;
-    const float diffuse = 1.0f - metal;
-    albedo *= glm::vec4(diffuse, diffuse, diffuse, 1.0f);
-  }
+glm::vec4 surface_albedo(const Surface& surface, glm::vec2 uv, glm::vec4 color) {
+  glm::vec4 albedo = surface.base_color * color;
+  if (surface.image != nullptr) albedo *= sample(*surface.image, uv, surface);
   return glm::clamp(albedo, glm::vec4(0.0f), glm::vec4(1.0f));
 }
 

@@ -185,10 +185,7 @@ glm::vec4 TransferTracer::Impl::albedo_at(std::uint32_t triangle, float b1, floa
       geometry.colors.empty() ? glm::vec4(1.0f) : interpolate(geometry.colors, triangle, b1, b2);
   const glm::vec2 uv = surface.image != nullptr ? interpolate(geometry.albedo_uv, triangle, b1, b2)
                                                 : glm::vec2(0.0f);
-  const glm::vec2 metallic_uv = surface.metallic_image != nullptr
-                                    ? interpolate(geometry.metallic_uv, triangle, b1, b2)
-                                    : glm::vec2(0.0f);
-  return surface_albedo(surface, uv, metallic_uv, color);
+  return surface_albedo(surface, uv, color);
 }
 
 // Masked texels let light through.

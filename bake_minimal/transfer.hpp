@@ -39,7 +39,6 @@ struct TraceGeometry {
   std::vector<std::uint32_t> other_side;  ///< of each triangle, or kNoOtherSide
   std::vector<glm::vec2> lightmap_uv;     ///< per vertex
   std::vector<glm::vec2> albedo_uv;       ///< per vertex, transformed
-  std::vector<glm::vec2> metallic_uv;     ///< per vertex, transformed; may be empty
   std::vector<glm::vec4> colors;          ///< per vertex; may be empty
   std::vector<Surface> surfaces;
 };
@@ -60,8 +59,7 @@ struct TransferOptions {
 [[nodiscard]] std::vector<glm::vec3> sphere_directions(int count, std::uint64_t seed);
 
 /// Linear albedo and alpha of a surface at texture coordinates.
-[[nodiscard]] glm::vec4 surface_albedo(const Surface& surface, glm::vec2 uv, glm::vec2 metallic_uv,
-                                       glm::vec4 color);
+[[nodiscard]] glm::vec4 surface_albedo(const Surface& surface, glm::vec2 uv, glm::vec4 color);
 
 /// Traces transfer vectors (Fatahalian, appendix A with the errata): for unit albedo at the texel,
 ///
