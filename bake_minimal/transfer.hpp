@@ -15,14 +15,11 @@ namespace relit::bake {
 
 inline constexpr std::uint32_t kNoOtherSide = 0xffffffffu;
 
-/// What a ray needs to know of a surface it hits. The image is borrowed from the Scene.
+/// What a ray needs to know of a surface it hits: its albedo as the player will see it. The image
+/// is borrowed.
 struct Surface {
-  glm::vec3 base_color{
-      1.0f};           ///< linear, already times (1 − metallic factor) where no texture has it
-  float metallic = 0;  ///< factor of the metallic texture's blue channel, 0 without one
-  float alpha = 1;
+  glm::vec4 base_color{1.0f};  ///< linear, straight alpha
   const Image* image = nullptr;
-  const Image* metallic_image = nullptr;
   container::Wrap wrap_u = container::Wrap::kRepeat;
   container::Wrap wrap_v = container::Wrap::kRepeat;
   bool linear_filter = true;

@@ -162,7 +162,7 @@ TEST_CASE("a wall shades the floor by its view factor, and bounces its colour") 
   // sky is covered, cos-weighted: F = 1/2. The wall itself sees half a sky and the floor below.
   QuadScene scene;
   Surface red;
-  red.base_color = glm::vec3(0.8f, 0.2f, 0.0f);
+  red.base_color = glm::vec4(0.8f, 0.2f, 0.0f, 1.0f);
   scene.geometry.surfaces.push_back(red);
   const std::size_t floor = add_square(scene, glm::vec3(0), glm::vec3(0, 1, 0), 0.05f);
   const std::size_t wall =
