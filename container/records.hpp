@@ -27,6 +27,7 @@ struct HeaderRecord {
   std::uint16_t version_major = 0;
   std::uint16_t version_minor = 1;
   std::string writer;  ///< name and version of the program that wrote the file
+  bool operator==(const HeaderRecord&) const = default;
 };
 
 /// One animation. Frame k is shown from k to k+1 frame durations; frame times are k / frame_rate.
@@ -38,6 +39,7 @@ struct ClipRecord {
   bool loop = false;
   std::array<float, 3> bounds_min{};  ///< of the posed meshes over the whole clip, metres
   std::array<float, 3> bounds_max{};
+  bool operator==(const ClipRecord&) const = default;
 };
 
 /// An image as its encoder left it.
@@ -45,6 +47,7 @@ struct ImageRecord {
   std::uint32_t id = 0;
   std::string media_type;  ///< "image/png" or "image/jpeg"
   std::vector<std::uint8_t> bytes;
+  bool operator==(const ImageRecord&) const = default;
 };
 
 enum class Wrap : std::uint8_t { kRepeat = 0, kClamp = 1, kMirror = 2 };
@@ -62,6 +65,7 @@ struct MaterialRecord {
   bool linear_filter = true;
   AlphaMode alpha_mode = AlphaMode::kOpaque;
   float alpha_cutoff = 0.5f;
+  bool operator==(const MaterialRecord&) const = default;
 };
 
 enum class Semantic : std::uint8_t {
@@ -82,12 +86,15 @@ struct VertexStream {
   std::array<float, 3> offset{};
   std::array<float, 3> scale{1, 1, 1};
   std::vector<std::uint8_t> bytes;
+  bool operator==(const VertexStream&) const = default;
 };
 
-/// Offsets that a morph weight of 1 adds to the positions: i16×4 per vertex, value = scale × integer.
+/// Offsets that a morph weight of 1 adds to the positions: i16×4 per vertex, value = scale ×
+/// integer.
 struct MorphTarget {
   std::array<float, 3> scale{1, 1, 1};
   std::vector<std::uint8_t> bytes;  ///< coded like a vertex stream, stride 8
+  bool operator==(const MorphTarget&) const = default;
 };
 
 /// A triangle list of at most 65 535 vertices with one material; front faces counter-clockwise, and
@@ -100,41 +107,53 @@ struct MeshRecord {
   std::uint32_t index_count = 0;
   std::vector<VertexStream> streams;
   std::vector<std::uint8_t> indices;  ///< meshoptimizer's index codec, then zstd
-  std::uint32_t first_morph_weight = 0;  ///< this mesh's targets use weights [first, first + targets)
+  std::uint32_t first_morph_weight =
+      0;  ///< this mesh's targets use weights [first, first + targets)
   std::vector<MorphTarget> morph_targets;
+  bool operator==(const MeshRecord&) const = default;
 };
 
 /// One node of the joint hierarchy; parents come before their children.
 struct NodeRecord {
   std::int32_t parent = -1;
   Affine local{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};  ///< where no channel animates it
+  bool operator==(const NodeRecord&) const = default;
 };
 
 /// A joint as the meshes' kJoints see it: world(node) × inverse_bind.
 struct PaletteEntry {
   std::uint32_t node = 0;
   Affine inverse_bind{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+  bool operator==(const PaletteEntry&) const = default;
 };
 
 struct SkeletonRecord {
   std::vector<NodeRecord> nodes;
   std::vector<PaletteEntry> palette;
   std::uint32_t morph_weight_count = 0;
+  bool operator==(const SkeletonRecord&) const = default;
 };
 
 enum class PoseKind : std::uint8_t {
   kJoints = 0,    ///< quantised TRS of nodes and morph weights
   kVertices = 1,  ///< quantised positions of every vertex; skeleton and morph targets unused
 };
-enum class ChannelTarget : std::uint8_t { kTranslation = 0, kRotation = 1, kScale = 2, kMorphWeight = 3 };
+enum class ChannelTarget : std::uint8_t {
+  kTranslation = 0,
+  kRotation = 1,
+  kScale = 2,
+  kMorphWeight = 3
+};
 
 /// One animated quantity. A node with any channel gets T, R and S from its channels, and from
 /// `translation`, `rotation`, `scale` of RestTrs where it has none for one of them.
 struct PoseChannel {
   ChannelTarget target = ChannelTarget::kTranslation;
-  std::uint32_t index = 0;            ///< node, or morph weight
-  std::array<float, 3> offset{};      ///< value = offset + step × integer, u16; rotations: see FORMAT.md
+  std::uint32_t index = 0;  ///< node, or morph weight
+  std::array<float, 3>
+      offset{};  ///< value = offset + step × integer, u16; rotations: see FORMAT.md
   std::array<float, 3> step{1, 1, 1};
+  bool operator==(const PoseChannel&) const = default;
 };
 
 /// The unanimated parts of a node that has channels. Rotation is x, y, z, w, of unit length.
@@ -143,6 +162,7 @@ struct RestTrs {
   std::array<float, 3> translation{};
   std::array<float, 4> rotation{0, 0, 0, 1};
   std::array<float, 3> scale{1, 1, 1};
+  bool operator==(const RestTrs&) const = default;
 };
 
 /// Quantisation of the vertices of one mesh (kVertices).
@@ -150,6 +170,7 @@ struct VertexRange {
   std::uint32_t mesh_id = 0;
   std::array<float, 3> offset{};
   std::array<float, 3> step{1, 1, 1};
+  bool operator==(const VertexRange&) const = default;
 };
 
 /// Describes the pose packets of a clip. One packet per segment holds all its frames.
@@ -160,6 +181,7 @@ struct PoseTrackRecord {
   std::vector<RestTrs> rest;
   std::vector<PoseChannel> channels;
   std::vector<VertexRange> vertex_ranges;
+  bool operator==(const PoseTrackRecord&) const = default;
 };
 
 enum class ModelKind : std::uint8_t { kShLightMap = 0 };
@@ -169,11 +191,12 @@ struct ModelRecord {
   std::uint32_t id = 0;
   std::uint32_t clip_id = 0;
   ModelKind kind = ModelKind::kShLightMap;
-  std::uint8_t order = 2;         ///< SH order N; (N+1)² coefficients
-  std::uint16_t width = 128;      ///< of the light map, texels
+  std::uint8_t order = 2;     ///< SH order N; (N+1)² coefficients
+  std::uint16_t width = 128;  ///< of the light map, texels
   std::uint16_t height = 128;
-  std::vector<Rgb> mean;          ///< μ[n], one per coefficient
+  std::vector<Rgb> mean;               ///< μ[n], one per coefficient
   std::int32_t prediction_plane = -1;  ///< reserved: index of s among the planes; -1: no prediction
+  bool operator==(const ModelRecord&) const = default;
 };
 
 enum class Chroma : std::uint8_t {
@@ -187,10 +210,12 @@ struct MatrixEntry {
   std::uint8_t coefficient = 0;
   std::uint8_t channel = 0;
   float value = 0;
+  bool operator==(const MatrixEntry&) const = default;
 };
 
 struct Rect {
   std::uint16_t x = 0, y = 0, width = 0, height = 0;
+  bool operator==(const Rect&) const = default;
 };
 
 /// Where a plane lies in its layer's pictures, and its column of M.
@@ -200,6 +225,7 @@ struct PlaneRecord {
   Rect exponent_rect;          ///< in samples of the exponent picture; ignored without exponents
   float scale = 1;
   std::vector<MatrixEntry> matrix;
+  bool operator==(const PlaneRecord&) const = default;
 };
 
 /// A group of planes with video streams of its own. Layers are in order of importance.
@@ -208,38 +234,41 @@ struct LayerRecord {
   std::uint32_t model_id = 0;
 
   std::uint32_t mantissa_track = 0;
-  std::string codec;            ///< FFmpeg's name of the codec: "h264", "mpeg4", "ffv1", "hevc", …
+  std::string codec;  ///< FFmpeg's name of the codec: "h264", "mpeg4", "ffv1", "hevc", …
   std::vector<std::uint8_t> codec_private;
   std::uint16_t coded_width = 0;
   std::uint16_t coded_height = 0;
-  std::uint8_t bit_depth = 8;   ///< 8 or 10
+  std::uint8_t bit_depth = 8;  ///< 8 or 10
   Chroma chroma = Chroma::k420;
   bool lossless = false;
 
-  bool has_exponents = false;
+  bool has_exponents = false;  ///< without them the exponent_* fields are ignored and not stored
   std::uint32_t exponent_track = 0;
-  std::string exponent_codec;   ///< "ffv1"
+  std::string exponent_codec;  ///< "ffv1"
   std::vector<std::uint8_t> exponent_private;
   std::uint16_t exponent_width = 0;
   std::uint16_t exponent_height = 0;
   std::uint8_t exponent_block = 1;  ///< side of the exponent block in texels: 1, 2, 4, 8, 16 or 32
 
   std::vector<PlaneRecord> planes;
+  bool operator==(const LayerRecord&) const = default;
 };
 
 /// A run of frames that can be decoded by itself. Its chunks follow it, one for each track, in the
-/// order of importance, and `chunk_bytes` says how long each record is (header and padding included),
-/// so that a client can ask for only the ones it wants.
+/// order of importance, and `chunk_bytes` says how long each record is (header and padding
+/// included), so that a client can ask for only the ones it wants.
 struct SegmentRecord {
-  std::uint32_t index = 0;     ///< within the file, from 0
+  std::uint32_t index = 0;  ///< within the file, from 0
   std::uint32_t clip_id = 0;
   std::uint64_t first_frame = 0;
   std::uint32_t frame_count = 0;
   struct ChunkSize {
     std::uint32_t track_id = 0;
     std::uint64_t chunk_bytes = 0;
+    bool operator==(const ChunkSize&) const = default;
   };
   std::vector<ChunkSize> chunks;
+  bool operator==(const SegmentRecord&) const = default;
 };
 
 /// One coded packet. Packets stand in decoding order; pts counts frames of the clip.
@@ -248,6 +277,7 @@ struct Packet {
   bool key = false;
   std::uint64_t offset = 0;  ///< of its bytes in ChunkRecord::data
   std::uint64_t size = 0;
+  bool operator==(const Packet&) const = default;
 };
 
 /// All packets of one track in one segment.
@@ -256,6 +286,7 @@ struct ChunkRecord {
   std::uint32_t segment_index = 0;
   std::vector<Packet> packets;
   std::vector<std::uint8_t> data;
+  bool operator==(const ChunkRecord&) const = default;
 };
 
 struct IndexRecord {
@@ -265,8 +296,18 @@ struct IndexRecord {
     std::uint64_t first_frame = 0;
     std::uint32_t frame_count = 0;
     std::uint64_t offset = 0;  ///< of the segment record, from the start of the file
+    bool operator==(const Entry&) const = default;
   };
   std::vector<Entry> segments;
+  bool operator==(const IndexRecord&) const = default;
+};
+
+/// The last record of a complete file.
+struct EndRecord {
+  std::uint64_t index_offset =
+      0;  ///< of the index record, from the start of the file; 0: there is none
+  std::uint64_t file_bytes = 0;  ///< of the whole file, this record included
+  bool operator==(const EndRecord&) const = default;
 };
 
 }  // namespace relit::container

@@ -50,15 +50,16 @@ struct PlaneView {
 ///
 ///     light map(p) = s(p) * E(N(p)) + constant + Σ_k weights[k] * value_k(p)
 ///
-/// Everything is divided by `magnitude`, the largest |L_n| of the light, which the picture's exposure
-/// multiplies back, so that no shader sees absolute radiance. A weight that is zero means that the
-/// plane need not be fetched, decoded or uploaded.
+/// Everything is divided by `magnitude`, the largest |L_n| of the light, which the picture's
+/// exposure multiplies back, so that no shader sees absolute radiance. A weight that is zero means
+/// that the plane need not be fetched, decoded or uploaded.
 struct FoldedLight {
-  std::span<const Rgb> weights;    ///< one for each plane of the model, in the model's order
-  Rgb constant{};                  ///< Σ_n L_n μ[n]
-  std::array<Rgb, 16> irradiance{};///< L_n A_l/π for the prediction E(N) = Σ_n irradiance[n] Y_n(N)
-  int prediction_plane = -1;       ///< index of s among the planes; -1: the model has no prediction
-  float magnitude = 1;             ///< > 0, finite
+  std::span<const Rgb> weights;  ///< one for each plane of the model, in the model's order
+  Rgb constant{};                ///< Σ_n L_n μ[n]
+  std::array<Rgb, 16>
+      irradiance{};           ///< L_n A_l/π for the prediction E(N) = Σ_n irradiance[n] Y_n(N)
+  int prediction_plane = -1;  ///< index of s among the planes; -1: the model has no prediction
+  float magnitude = 1;        ///< > 0, finite
 };
 
 }  // namespace relit

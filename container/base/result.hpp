@@ -10,16 +10,16 @@ namespace relit {
 
 /// What kind of failure an Error reports. The numbers are part of the C ABI and never change.
 enum class ErrorCode : int {
-  kIo = 1,            ///< reading or writing failed: missing file, full disk, lost connection
-  kTruncated = 2,     ///< the data end before they should
-  kCorrupt = 3,       ///< the data contradict themselves or their checksum
-  kUnsupported = 4,   ///< well formed, but needs something this build does not have
-  kLimit = 5,         ///< a size or count beyond container/base/limits.hpp
-  kInvalid = 6,       ///< an argument or an input value that makes no sense
-  kNotFound = 7,      ///< a name, frame, clip or track that the file does not hold
-  kOutOfMemory = 8,   ///< an allocation failed, or a budget does not suffice
-  kEnvironment = 9,   ///< the machine lacks something: no GL, no display, no encoder
-  kCancelled = 10,    ///< the caller asked to stop
+  kIo = 1,           ///< reading or writing failed: missing file, full disk, lost connection
+  kTruncated = 2,    ///< the data end before they should
+  kCorrupt = 3,      ///< the data contradict themselves or their checksum
+  kUnsupported = 4,  ///< well formed, but needs something this build does not have
+  kLimit = 5,        ///< a size or count beyond container/base/limits.hpp
+  kInvalid = 6,      ///< an argument or an input value that makes no sense
+  kNotFound = 7,     ///< a name, frame, clip or track that the file does not hold
+  kOutOfMemory = 8,  ///< an allocation failed, or a budget does not suffice
+  kEnvironment = 9,  ///< the machine lacks something: no GL, no display, no encoder
+  kCancelled = 10,   ///< the caller asked to stop
 };
 
 /// A failure: what happened, where (file, byte offset, track, frame), and what would be right.
@@ -38,8 +38,8 @@ struct Unexpected {
   return {Error{code, std::move(message)}};
 }
 
-/// Either a value or an Error. The members are named as in C++23's std::expected, by which it can be
-/// replaced one day. value(), * and -> require has_value(); error() requires !has_value().
+/// Either a value or an Error. The members are named as in C++23's std::expected, by which it can
+/// be replaced one day. value(), * and -> require has_value(); error() requires !has_value().
 template <class T>
 class [[nodiscard]] Result {
  public:
@@ -116,15 +116,15 @@ using Status = Result<void>;
 #define RELIT_CONCAT(a, b) RELIT_CONCAT_INNER(a, b)
 
 /// Returns the Error of `expression` (a Status or any Result) from the enclosing function.
-#define RELIT_TRY(expression)                                                        \
-  do {                                                                               \
-    if (auto relit_try = (expression); !relit_try)                                   \
-      return ::relit::Unexpected{std::move(relit_try).error()};                      \
+#define RELIT_TRY(expression)                                   \
+  do {                                                          \
+    if (auto relit_try = (expression); !relit_try)              \
+      return ::relit::Unexpected{std::move(relit_try).error()}; \
   } while (false)
 
 /// `RELIT_ASSIGN(auto x, f())`: x is f()'s value, or the enclosing function returns f()'s Error.
-#define RELIT_ASSIGN(declaration, expression)                                        \
-  auto RELIT_CONCAT(relit_assign_, __LINE__) = (expression);                         \
-  if (!RELIT_CONCAT(relit_assign_, __LINE__))                                        \
+#define RELIT_ASSIGN(declaration, expression)                                             \
+  auto RELIT_CONCAT(relit_assign_, __LINE__) = (expression);                              \
+  if (!RELIT_CONCAT(relit_assign_, __LINE__))                                             \
     return ::relit::Unexpected{std::move(RELIT_CONCAT(relit_assign_, __LINE__)).error()}; \
   declaration = std::move(*RELIT_CONCAT(relit_assign_, __LINE__))

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: MIT
+#include "container/byte_source.hpp"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <limits>
+#include <system_error>
+
+namespace relit::container {
+namespace {
+
+Unexpected system_failure(const std::string& doing, int error) {
+  return fail(ErrorCode::kIo, doing + ": " + std::generic_category().message(error));
+}
+
+}  // namespace
+
+Status ByteSource::seek(std::uint64_t) {
+  return fail(ErrorCode::kUnsupported, "this source can only be read from front to back");
+}
+
+Result<std::unique_ptr<FileSource>> FileSource::open(const std::string& path) {
+  if (path == "-")
+    return std::unique_ptr<FileSource>(
+        new FileSource(STDIN_FILENO, false, "standard input", std::nullopt));
+  int descriptor = -1;
+  do {
+    descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  } while (descriptor < 0 && errno == EINTR);
+  if (descriptor < 0) return system_failure("cannot open '" + path + "'", errno);
+  std::unique_ptr<FileSource> source(new FileSource(descriptor, true, "'" + path + "'", {}));
+  struct stat info {};
+  if (::fstat(descriptor, &info) != 0)
+    return system_failure("cannot examine '" + path + "'", errno);
+  if (S_ISDIR(info.st_mode)) return system_failure("cannot read '" + path + "'", EISDIR);
+  if (S_ISREG(info.st_mode)) source->size_ = static_cast<std::uint64_t>(info.st_size);
+  return source;
+}
+
+FileSource::~FileSource() {
+  if (owned_) ::close(descriptor_);
+}
+
+Result<std::size_t> FileSource::read(std::span<std::uint8_t> out) {
+  // POSIX leaves requests beyond SSIZE_MAX open, and Linux moves less than 2 GiB at once.
+  const std::size_t wanted = std::min<std::size_t>(out.size(), std::size_t{1} << 30);
+  ssize_t got = 0;
+  do {
+    got = ::read(descriptor_, out.data(), wanted);
+  } while (got < 0 && errno == EINTR);
+  if (got < 0) return system_failure("cannot read " + name_, errno);
+  return static_cast<std::size_t>(got);
+}
+
+Status FileSource::seek(std::uint64_t offset_bytes) {
+  if (!seekable()) return ByteSource::seek(offset_bytes);
+  if (offset_bytes > static_cast<std::uint64_t>(std::numeric_limits<off_t>::max()))
+    return fail(ErrorCode::kIo, "cannot seek to byte " + std::to_string(offset_bytes) + " of " +
+                                    name_ + ": beyond what the system can address");
+  if (::lseek(descriptor_, static_cast<off_t>(offset_bytes), SEEK_SET) < 0)
+    return system_failure("cannot seek in " + name_, errno);
+  return {};
+}
+
+Result<std::size_t> MemorySource::read(std::span<std::uint8_t> out) {
+  const std::size_t n = std::min(out.size(), bytes_.size() - position_);
+  if (n > 0) std::memcpy(out.data(), bytes_.data() + position_, n);
+  position_ += n;
+  return n;
+}
+
+Status MemorySource::seek(std::uint64_t offset_bytes) {
+  position_ = static_cast<std::size_t>(std::min<std::uint64_t>(offset_bytes, bytes_.size()));
+  return {};
+}
+
+}  // namespace relit::container

@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: MIT
+#include "container/writer.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include "container/base/limits.hpp"
+#include "container/record_checks.hpp"
+#include "container/record_codec.hpp"
+
+namespace relit::container {
+
+using namespace checks;
+
+Result<Writer> Writer::create(ByteSink& sink, const std::string& program) {
+  Writer writer(sink);
+  const HeaderRecord header{kVersionMajor, kVersionMinor, program};
+  const auto write = [&]() -> Status {
+    RELIT_TRY(validate(header));
+    RELIT_TRY(writer.write_bytes(kSignature));
+    RELIT_TRY(writer.enter(order_of(types::kHeader)));
+    return writer.write_record(types::kHeader, serialize(header));
+  };
+  RELIT_TRY(writer.settle(write(), "header"));
+  return writer;
+}
+
+template <class R>
+Status Writer::add_static(RecordType type, const R& record) {
+  const auto write = [&]() -> Status {
+    RELIT_TRY(enter(order_of(type)));
+    RELIT_TRY(validate(record));
+    RELIT_TRY(references_.add(record));
+    const auto payload = serialize(record);
+    static_bytes_ += payload.size();
+    RELIT_TRY(at_most(static_bytes_, limits::kStaticBytes, "size of all records before segments"));
+    return write_record(type, payload);
+  };
+  return settle(write(), type_name(type).c_str());
+}
+
+Status Writer::add(const ClipRecord& record) { return add_static(types::kClip, record); }
+Status Writer::add(const ImageRecord& record) { return add_static(types::kImage, record); }
+Status Writer::add(const MaterialRecord& record) { return add_static(types::kMaterial, record); }
+Status Writer::add(const MeshRecord& record) { return add_static(types::kMesh, record); }
+Status Writer::add(const SkeletonRecord& record) { return add_static(types::kSkeleton, record); }
+Status Writer::add(const PoseTrackRecord& record) { return add_static(types::kPoseTrack, record); }
+Status Writer::add(const ModelRecord& record) { return add_static(types::kModel, record); }
+Status Writer::add(const LayerRecord& record) { return add_static(types::kLayer, record); }
+
+Status Writer::add_ancillary(RecordType type, std::span<const std::uint8_t> payload) {
+  const auto write = [&]() -> Status {
+    RELIT_TRY(enter(order_));
+    RELIT_TRY(require(is_well_formed(type) && !is_critical(type),
+                      "'" + type_name(type) + "' is not the type of an ancillary record"));
+    return write_record(type, payload);
+  };
+  return settle(write(), "ancillary record");
+}
+
+Status Writer::check_segment(const SegmentInfo& info,
+                             const std::vector<ChunkRecord>& chunks) const {
+  const auto frame_count = references_.frame_count(info.clip_id);
+  RELIT_TRY(
+      require(frame_count.has_value(), "clip " + std::to_string(info.clip_id) + " does not exist"));
+  const auto done = frames_written_.find(info.clip_id);
+  const std::uint64_t expected = done == frames_written_.end() ? 0 : done->second;
+  RELIT_TRY(require(info.first_frame == expected,
+                    "the segment starts with frame " + std::to_string(info.first_frame) +
+                        ", the next one of its clip is " + std::to_string(expected)));
+  RELIT_TRY(
+      require(info.frame_count <= *frame_count - expected,
+              "the segment goes beyond the clip's " + std::to_string(*frame_count) + " frames"));
+  const auto tracks = references_.tracks(info.clip_id);
+  for (const ChunkRecord& chunk : chunks)
+    RELIT_TRY(require(std::ranges::find(tracks, chunk.track_id) != tracks.end(),
+                      "track " + std::to_string(chunk.track_id) + " is not one of the clip's"));
+  for (const std::uint32_t track : tracks)
+    RELIT_TRY(require(std::ranges::count(chunks, track, &ChunkRecord::track_id) == 1,
+                      "the segment needs exactly one chunk for track " + std::to_string(track)));
+  return {};
+}
+
+Status Writer::write_segment(const SegmentInfo& info, std::vector<ChunkRecord> chunks) {
+  const auto write = [&]() -> Status {
+    if (order_ < order_of(types::kSegment)) RELIT_TRY(references_.finish());
+    RELIT_TRY(enter(order_of(types::kSegment)));
+    RELIT_TRY(check_segment(info, chunks));
+    const auto tracks = references_.tracks(info.clip_id);
+    const auto place = [&](const ChunkRecord& c) { return std::ranges::find(tracks, c.track_id); };
+    std::ranges::sort(chunks, {}, place);
+
+    SegmentRecord segment{static_cast<std::uint32_t>(index_.segments.size()),
+                          info.clip_id,
+                          info.first_frame,
+                          info.frame_count,
+                          {}};
+    std::vector<std::vector<std::uint8_t>> payloads;
+    for (ChunkRecord& chunk : chunks) {
+      chunk.segment_index = segment.index;
+      RELIT_TRY(validate(chunk));
+      RELIT_TRY(check_chunk(segment, chunk));
+      payloads.push_back(serialize(chunk));
+      segment.chunks.push_back({chunk.track_id, record_bytes(payloads.back().size())});
+      chunk.data = {};
+    }
+    RELIT_TRY(validate(segment));
+    index_.segments.push_back(
+        {segment.index, segment.clip_id, segment.first_frame, segment.frame_count, offset_});
+    RELIT_TRY(write_record(types::kSegment, serialize(segment)));
+    for (const auto& payload : payloads) RELIT_TRY(write_record(types::kChunk, payload));
+    frames_written_[info.clip_id] = info.first_frame + info.frame_count;
+    return {};
+  };
+  return settle(write(), "segment");
+}
+
+Status Writer::finish() {
+  const auto write = [&]() -> Status {
+    if (order_ < order_of(types::kSegment)) RELIT_TRY(references_.finish());
+    RELIT_TRY(enter(order_of(types::kIndex)));
+    for (const std::uint32_t clip : references_.clips()) {
+      const auto done = frames_written_.find(clip);
+      const std::uint64_t frames = done == frames_written_.end() ? 0 : done->second;
+      RELIT_TRY(require(references_.tracks(clip).empty() || frames == references_.frame_count(clip),
+                        "clip " + std::to_string(clip) + " has segments for " +
+                            std::to_string(frames) + " of its " +
+                            std::to_string(*references_.frame_count(clip)) + " frames"));
+    }
+    const EndRecord end{
+        offset_, offset_ + record_bytes(serialize(index_).size()) + record_bytes(kEndPayloadBytes)};
+    RELIT_TRY(validate(index_));
+    RELIT_TRY(write_record(types::kIndex, serialize(index_)));
+    RELIT_TRY(enter(order_of(types::kEnd)));
+    return write_record(types::kEnd, serialize(end));
+  };
+  RELIT_TRY(settle(write(), "end of the file"));
+  closed_ = true;
+  return {};
+}
+
+Status Writer::write_record(RecordType type, std::span<const std::uint8_t> payload) {
+  RELIT_TRY(at_most(payload.size(), limits::kRecordBytes, "size of the record"));
+  RELIT_TRY(write_bytes(encode_header({type, 0, payload.size(), crc32(payload)})));
+  RELIT_TRY(write_bytes(payload));
+  constexpr std::array<std::uint8_t, kRecordAlignment> kZeros{};
+  return write_bytes(std::span(kZeros).first(padding_after(payload.size())));
+}
+
+Status Writer::write_bytes(std::span<const std::uint8_t> bytes) {
+  RELIT_TRY(sink_->write(bytes));
+  offset_ += bytes.size();
+  return {};
+}
+
+Status Writer::enter(int order) {
+  if (closed_) return fail(ErrorCode::kInvalid, "the writer is finished, or failed before");
+  const bool once = order == order_of(types::kSkeleton) && order_ == order;
+  RELIT_TRY(
+      require(order >= order_ && !once, once ? "a file has one skeleton"
+                                             : "this record comes too late: the order is "
+                                               "CLIP IMAG MATL MESH SKEL POSE MODL LAYR SEGM"));
+  order_ = order;
+  return {};
+}
+
+Status Writer::settle(Status status, const char* doing) {
+  if (status) return status;
+  closed_ = true;
+  Error error = std::move(status).error();
+  if (error.code == ErrorCode::kCorrupt) error.code = ErrorCode::kInvalid;
+  return fail(error.code, std::string("writing ") + doing + ": " + error.message);
+}
+
+}  // namespace relit::container

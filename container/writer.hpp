@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "container/base/result.hpp"
+#include "container/byte_sink.hpp"
+#include "container/framing.hpp"
+#include "container/records.hpp"
+#include "container/references.hpp"
+
+namespace relit::container {
+
+/// What a caller says of a segment; the writer adds the rest of SegmentRecord.
+struct SegmentInfo {
+  std::uint32_t clip_id = 0;
+  std::uint64_t first_frame = 0;
+  std::uint32_t frame_count = 0;
+};
+
+/// Writes a .relit file from front to back:
+///
+///     Writer::create, add(…) in the order of the overloads below, write_segment(…)…, finish
+///
+/// Everything is checked before it is written. All functions return kInvalid for a record that
+/// breaks a rule of the format (the message says which), kLimit, kUnsupported, or the sink's kIo;
+/// after an error the writer takes nothing more. The same calls give the same bytes. One thread at
+/// a time.
+class Writer {
+ public:
+  /// Writes signature and header. `program` is the name and version of the calling program. The
+  /// sink stays the caller's, outlives the writer, and is not committed by it.
+  static Result<Writer> create(ByteSink& sink, const std::string& program);
+
+  Status add(const ClipRecord& record);
+  Status add(const ImageRecord& record);
+  Status add(const MaterialRecord& record);
+  Status add(const MeshRecord& record);
+  Status add(const SkeletonRecord& record);  ///< at most once
+  Status add(const PoseTrackRecord& record);
+  Status add(const ModelRecord& record);
+  Status add(const LayerRecord& record);
+
+  /// An ancillary record of a type that is not of this format; allowed anywhere between the others.
+  Status add_ancillary(RecordType type, std::span<const std::uint8_t> payload);
+
+  /// A segment with a chunk for every track of its clip, in any order: they are written in the
+  /// order of the tracks' declaration. The segments of a clip follow one another without gaps from
+  /// frame 0; those of several clips may be mixed. `segment_index` of the chunks is filled in.
+  Status write_segment(const SegmentInfo& info, std::vector<ChunkRecord> chunks);
+
+  /// Writes index and end record. Every clip that has tracks must be complete.
+  Status finish();
+
+  [[nodiscard]] std::uint64_t bytes_written() const { return offset_; }
+
+ private:
+  explicit Writer(ByteSink& sink) : sink_(&sink) {}
+
+  template <class R>
+  Status add_static(RecordType type, const R& record);
+  Status check_segment(const SegmentInfo& info, const std::vector<ChunkRecord>& chunks) const;
+  Status write_record(RecordType type, std::span<const std::uint8_t> payload);
+  Status write_bytes(std::span<const std::uint8_t> bytes);
+  Status enter(int order);
+  /// Closes the writer on failure; a breach of the format becomes kInvalid.
+  Status settle(Status status, const char* doing);
+
+  ByteSink* sink_;
+  std::uint64_t offset_ = 0;
+  int order_ = -1;  ///< order_of() of the last record
+  bool closed_ = false;
+  std::uint64_t static_bytes_ = 0;
+  ReferenceChecker references_;
+  std::map<std::uint32_t, std::uint64_t> frames_written_;  ///< by clip
+  IndexRecord index_;
+};
+
+}  // namespace relit::container
