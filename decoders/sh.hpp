@@ -10,7 +10,8 @@
 #include "container/base/plane_view.hpp"
 #include "container/base/result.hpp"
 
-/// Real, orthonormal spherical harmonics without the Condon-Shortley sign, n = l² + l + m, orders 0..3.
+/// Real, orthonormal spherical harmonics without the Condon-Shortley sign, n = l² + l + m, orders
+/// 0..3.
 namespace relit::decoders {
 
 [[nodiscard]] constexpr int coefficient_count(int order) { return (order + 1) * (order + 1); }
@@ -41,19 +42,21 @@ struct Environment {
 /// polar axis is z, so what goes on about +Y is simple only between two such exchanges.
 void exchange_y_and_z(Light& light);
 
-/// Projects with the exact solid angle of every pixel and the mean of Y_n over it; a constant image of
-/// radiance 1 gives L_0 = √(4π) to 1e-12. Errors: kInvalid for non-finite or negative pixels (says
-/// where) and for a size that `rgb` does not have, kLimit for sides beyond limits::kImageSide.
+/// Projects with the exact solid angle of every pixel and the mean of Y_n over it; a constant image
+/// of radiance 1 gives L_0 = √(4π) to 1e-12. Errors: kInvalid for non-finite or negative pixels
+/// (says where) and for a size that `rgb` does not have, kLimit for sides beyond
+/// limits::kImageSide.
 [[nodiscard]] Result<Light> project_environment(const Environment& environment, int order);
 
-/// Turns the light about +Y by `angle_rad`, added to φ: what shone from φ shines from φ + angle_rad.
+/// Turns the light about +Y by `angle_rad`, added to φ: what shone from φ shines from φ +
+/// angle_rad.
 void rotate_light_y(Light& light, double angle_rad);
 
 /// Multiplies band l by (1 + cos(πl/5)) / 2, against ringing.
 void window_light(Light& light);
 
-/// The least radiance of the light's reconstruction over the sphere, per channel, by dense sampling and
-/// refinement; negative where the truncation rings.
+/// The least radiance of the light's reconstruction over the sphere, per channel, by dense sampling
+/// and refinement; negative where the truncation rings.
 [[nodiscard]] std::array<double, 3> minimum_radiance(const Light& light);
 
 /// Σ_n L_n Y_n(direction).

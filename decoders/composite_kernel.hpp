@@ -1,0 +1,367 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <bit>
+#include <cfloat>
+#include <cstdint>
+
+#include "decoders/composite.hpp"
+#include "decoders/sh_constants.hpp"
+
+/// The composite's kernel, written once over a vector type V. Each composite_*.cpp includes it
+/// after it has defined RELIT_KERNEL as the attribute that lets the compiler use the processor's
+/// instructions; everything has internal linkage, so that no other file can be given code its
+/// processor lacks.
+///
+/// All kernels do the same float operations in the same order, without fused multiply-adds, so
+/// their results are equal bit for bit (32-bit NEON flushes subnormals: there, to 2^-126 per
+/// plane).
+#ifndef RELIT_KERNEL
+#define RELIT_KERNEL
+#endif
+
+namespace relit::decoders {
+namespace {
+
+/// One texel at a time: the reference, and the ends of rows.
+struct Scalar {
+  using F = float;
+  using I = std::int32_t;
+  static constexpr int kLanes = 1;
+
+  RELIT_KERNEL static F load(const float* p) { return *p; }
+  RELIT_KERNEL static void store(float* p, F v) { *p = v; }
+  RELIT_KERNEL static F set(float v) { return v; }
+  RELIT_KERNEL static F add(F a, F b) { return a + b; }
+  RELIT_KERNEL static F sub(F a, F b) { return a - b; }
+  RELIT_KERNEL static F mul(F a, F b) { return a * b; }
+  RELIT_KERNEL static I set_int(int v) { return v; }
+  RELIT_KERNEL static I sub_int(I a, I b) { return a - b; }
+  RELIT_KERNEL static F to_float(I v) { return static_cast<float>(v); }
+  /// The samples of kLanes texels, each shown 2^kShift times, from p on; the second argument is
+  /// their type, which p need not be aligned for.
+  template <int kShift>
+  RELIT_KERNEL static I load_samples(const std::uint8_t* p, std::uint8_t) {
+    return *p;
+  }
+  template <int kShift>
+  RELIT_KERNEL static I load_samples(const std::uint8_t* p, std::uint16_t) {
+    std::uint16_t v;
+    __builtin_memcpy(&v, p, sizeof v);
+    return v;
+  }
+  /// 2^(e - zero), and 0 for e = 0. The product of two normal powers of two is exact even where it
+  /// is subnormal: e in 0..255, zero in 128..150.
+  RELIT_KERNEL static F step(I e, int zero) {
+    if (e == 0) return 0;
+    const int half = e >> 1;
+    const auto power = [](int exponent) {
+      return std::bit_cast<float>(static_cast<std::uint32_t>(exponent + 127) << 23);
+    };
+    return power(half - 64) * power(e - half - zero + 64);
+  }
+  /// Into the range of finite floats; what is not a number becomes FLT_MAX.
+  RELIT_KERNEL static F saturate(F v) {
+    const float below = v < FLT_MAX ? v : FLT_MAX;
+    return below > -FLT_MAX ? below : -FLT_MAX;
+  }
+  RELIT_KERNEL static void load_vectors(const float* p, F& x, F& y, F& z) {
+    x = p[0];
+    y = p[1];
+    z = p[2];
+  }
+};
+
+/// A part of the light map that stays in the first-level cache while all planes are added to it.
+struct Tile {
+  static constexpr int kTexels = 1024;
+  int x = 0, y = 0, width = 0, height = 0;
+};
+
+/// What a plane adds to a row of a tile.
+struct RowJob {
+  const std::uint8_t* mantissas = nullptr;  ///< the row's first
+  const float* steps = nullptr;             ///< one for each texel, or null
+  int zero = 0;
+  float weight[3] = {};  ///< the plane's scale included
+  int channel = 0;       ///< when there is only one
+  float* out[3] = {};
+  const float* normals = nullptr;
+  const float (*prediction)[3] = nullptr;  ///< [9][rgb]
+};
+
+template <class V, class Sample, int kShift, bool kStepped>
+RELIT_KERNEL inline typename V::F value_at(const RowJob& row, int x) {
+  const std::uint8_t* samples =
+      row.mantissas + (x >> kShift) * static_cast<std::ptrdiff_t>(sizeof(Sample));
+  const auto mantissa = V::template load_samples<kShift>(samples, Sample{});
+  const auto value = V::to_float(V::sub_int(mantissa, V::set_int(row.zero)));
+  if constexpr (kStepped) return V::mul(value, V::load(row.steps + x));
+  return value;
+}
+
+/// out[c] += weight[c] · value, for one channel or all, from texel `x` of the row while a whole
+/// vector is left. Returns the first texel not done.
+template <class V, class Sample, int kShift, bool kStepped, bool kOneChannel>
+RELIT_KERNEL int accumulate(const RowJob& row, int x, int width) {
+  const auto weight0 = V::set(row.weight[kOneChannel ? row.channel : 0]);
+  const auto weight1 = V::set(row.weight[1]);
+  const auto weight2 = V::set(row.weight[2]);
+  float* const out0 = row.out[kOneChannel ? row.channel : 0];
+  float* const out1 = row.out[1];
+  float* const out2 = row.out[2];
+  const RowJob local = row;  // `out` cannot alias a copy, so the loop keeps it in registers
+  for (; x + V::kLanes <= width; x += V::kLanes) {
+    const auto value = value_at<V, Sample, kShift, kStepped>(local, x);
+    V::store(out0 + x, V::add(V::load(out0 + x), V::mul(weight0, value)));
+    if constexpr (!kOneChannel) {
+      V::store(out1 + x, V::add(V::load(out1 + x), V::mul(weight1, value)));
+      V::store(out2 + x, V::add(V::load(out2 + x), V::mul(weight2, value)));
+    }
+  }
+  return x;
+}
+
+/// out[c] += value · E_c(N), E's polynomial being `prediction`, with the plane's scale in it.
+template <class V, class Sample, int kShift, bool kStepped>
+RELIT_KERNEL int predict(const RowJob& row, int x, int width) {
+  using F = typename V::F;
+  const RowJob local = row;
+  for (; x + V::kLanes <= width; x += V::kLanes) {
+    F nx, ny, nz;
+    V::load_vectors(local.normals + 3 * static_cast<std::ptrdiff_t>(x), nx, ny, nz);
+    const F zz3 = V::mul(V::mul(nz, nz), V::set(3));
+    const F polynomial[9] = {V::set(1),
+                             ny,
+                             nz,
+                             nx,
+                             V::mul(nx, ny),
+                             V::mul(ny, nz),
+                             V::sub(zz3, V::set(1)),
+                             V::mul(nx, nz),
+                             V::sub(V::mul(nx, nx), V::mul(ny, ny))};
+    const F value = value_at<V, Sample, kShift, kStepped>(local, x);
+    for (int c = 0; c < 3; ++c) {
+      F sum = V::set(local.prediction[0][c]);
+      for (int n = 1; n < 9; ++n) {
+        sum = V::add(sum, V::mul(V::set(local.prediction[n][c]), polynomial[n]));
+      }
+      float* const out = local.out[c] + x;
+      V::store(out, V::add(V::load(out), V::mul(value, sum)));
+    }
+  }
+  return x;
+}
+
+enum class RowOperation { kAccumulateOne, kAccumulateAll, kPredict };
+
+template <class V, class Sample, int kShift, bool kStepped>
+RELIT_KERNEL void run_row(const RowJob& row, RowOperation operation, int width) {
+  int x = 0;
+  switch (operation) {
+    case RowOperation::kAccumulateOne:
+      x = accumulate<V, Sample, kShift, kStepped, true>(row, x, width);
+      accumulate<Scalar, Sample, kShift, kStepped, true>(row, x, width);
+      break;
+    case RowOperation::kAccumulateAll:
+      x = accumulate<V, Sample, kShift, kStepped, false>(row, x, width);
+      accumulate<Scalar, Sample, kShift, kStepped, false>(row, x, width);
+      break;
+    case RowOperation::kPredict:
+      x = predict<V, Sample, kShift, kStepped>(row, x, width);
+      predict<Scalar, Sample, kShift, kStepped>(row, x, width);
+      break;
+  }
+}
+
+using RowFunction = void (*)(const RowJob&, RowOperation, int);
+
+template <class V, class Sample>
+RELIT_KERNEL RowFunction row_function(int shift, bool stepped) {
+  if (shift == 0) return stepped ? run_row<V, Sample, 0, true> : run_row<V, Sample, 0, false>;
+  return stepped ? run_row<V, Sample, 1, true> : run_row<V, Sample, 1, false>;
+}
+
+template <class V, int kShift>
+RELIT_KERNEL void expand_steps(const std::uint8_t* exponents, int zero, float* steps, int width) {
+  int x = 0;
+  for (; x + V::kLanes <= width; x += V::kLanes) {
+    const std::uint8_t* p = exponents + (x >> kShift);
+    if constexpr ((1 << kShift) < V::kLanes) {
+      V::store(steps + x, V::step(V::template load_samples<kShift>(p, std::uint8_t{}), zero));
+    } else {
+      V::store(steps + x, V::set(Scalar::step(*p, zero)));
+    }
+  }
+  for (; x < width; ++x) steps[x] = Scalar::step(exponents[x >> kShift], zero);
+}
+
+/// 2^(E - E₀) for every texel of the tile, rows of tile.width.
+template <class V>
+RELIT_KERNEL void tile_steps(const PlaneView& plane, const Tile& tile, float* steps) {
+  const int shift = plane.exponent_shift;
+  for (int i = 0; i < tile.height; ++i) {
+    const int y = tile.y + i;
+    float* const row = steps + static_cast<std::ptrdiff_t>(i) * tile.width;
+    if (i > 0 && y >> shift == (y - 1) >> shift) {
+      __builtin_memcpy(row, row - tile.width, static_cast<std::size_t>(tile.width) * sizeof(float));
+      continue;
+    }
+    const std::uint8_t* exponents =
+        plane.exponent.data + (y >> shift) * plane.exponent.stride_bytes + (tile.x >> shift);
+    switch (shift) {
+      case 0:
+        expand_steps<V, 0>(exponents, plane.exponent_zero, row, tile.width);
+        break;
+      case 1:
+        expand_steps<V, 1>(exponents, plane.exponent_zero, row, tile.width);
+        break;
+      case 2:
+        expand_steps<V, 2>(exponents, plane.exponent_zero, row, tile.width);
+        break;
+      case 3:
+        expand_steps<V, 3>(exponents, plane.exponent_zero, row, tile.width);
+        break;
+      case 4:
+        expand_steps<V, 4>(exponents, plane.exponent_zero, row, tile.width);
+        break;
+      default:
+        expand_steps<V, 5>(exponents, plane.exponent_zero, row, tile.width);
+        break;
+    }
+  }
+}
+
+RELIT_KERNEL inline bool same_steps(const PlaneView& a, const PlaneView& b) {
+  return a.exponent.data == b.exponent.data && a.exponent.stride_bytes == b.exponent.stride_bytes &&
+         a.exponent_shift == b.exponent_shift && a.exponent_zero == b.exponent_zero;
+}
+
+/// Points `row` at row y of the tile, all but steps and weights.
+RELIT_KERNEL inline void aim(const CompositeJob& job, const PlaneView& plane, const Tile& tile,
+                             int y, RowJob& row) {
+  const int shift = plane.mantissa_shift;
+  row.mantissas = plane.mantissa.data + (y >> shift) * plane.mantissa.stride_bytes +
+                  static_cast<std::ptrdiff_t>(tile.x >> shift) * plane.mantissa.bytes_per_sample;
+  const std::ptrdiff_t texel = static_cast<std::ptrdiff_t>(y) * job.width + tile.x;
+  const std::ptrdiff_t area = static_cast<std::ptrdiff_t>(job.width) * job.height;
+  for (int c = 0; c < 3; ++c) row.out[c] = job.out.data() + c * area + texel;
+  if (row.prediction != nullptr) row.normals = &job.normals.data()[texel].x;
+}
+
+template <class V>
+RELIT_KERNEL void run_plane(const CompositeJob& job, const PlaneView& plane, const Tile& tile,
+                            const float* steps, RowJob& row, RowOperation operation) {
+  const bool stepped = steps != nullptr;
+  const RowFunction function = plane.mantissa.bytes_per_sample == 1
+                                   ? row_function<V, std::uint8_t>(plane.mantissa_shift, stepped)
+                                   : row_function<V, std::uint16_t>(plane.mantissa_shift, stepped);
+  for (int i = 0; i < tile.height; ++i) {
+    aim(job, plane, tile, tile.y + i, row);
+    row.steps = stepped ? steps + static_cast<std::ptrdiff_t>(i) * tile.width : nullptr;
+    function(row, operation, tile.width);
+  }
+}
+
+/// The factors of E(N)'s polynomial, with the plane's scale.
+RELIT_KERNEL inline void fold_prediction(const FoldedLight& light, float scale,
+                                         float (&factors)[9][3]) {
+  constexpr double kFactor[9] = {kBand0,   kBand1,   kBand1,   kBand1,      kBand2Xy,
+                                 kBand2Xy, kBand2Zz, kBand2Xy, kBand2Xy / 2};
+  for (std::size_t n = 0; n < 9; ++n) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      factors[n][c] = static_cast<float>(kFactor[n] * static_cast<double>(light.irradiance[n][c]) *
+                                         static_cast<double>(scale));
+    }
+  }
+}
+
+template <class V>
+RELIT_KERNEL void fill(const CompositeJob& job, const Tile& tile) {
+  const std::ptrdiff_t area = static_cast<std::ptrdiff_t>(job.width) * job.height;
+  for (int c = 0; c < 3; ++c) {
+    for (int y = tile.y; y < tile.y + tile.height; ++y) {
+      float* const out =
+          job.out.data() + c * area + static_cast<std::ptrdiff_t>(y) * job.width + tile.x;
+      const float constant = job.light.constant[static_cast<std::size_t>(c)];
+      int x = 0;
+      for (; x + V::kLanes <= tile.width; x += V::kLanes) V::store(out + x, V::set(constant));
+      for (; x < tile.width; ++x) out[x] = constant;
+    }
+  }
+}
+
+template <class V>
+RELIT_KERNEL void saturate(const CompositeJob& job, const Tile& tile) {
+  const std::ptrdiff_t area = static_cast<std::ptrdiff_t>(job.width) * job.height;
+  for (int c = 0; c < 3; ++c) {
+    for (int y = tile.y; y < tile.y + tile.height; ++y) {
+      float* const out =
+          job.out.data() + c * area + static_cast<std::ptrdiff_t>(y) * job.width + tile.x;
+      int x = 0;
+      for (; x + V::kLanes <= tile.width; x += V::kLanes) {
+        V::store(out + x, V::saturate(V::load(out + x)));
+      }
+      for (; x < tile.width; ++x) out[x] = Scalar::saturate(out[x]);
+    }
+  }
+}
+
+template <class V>
+RELIT_KERNEL void run_tile(const CompositeJob& job, const Tile& tile) {
+  alignas(32) float steps[Tile::kTexels];
+  const PlaneView* stepped = nullptr;  // whose steps those are: an RGB group shares them
+  fill<V>(job, tile);
+  for (std::size_t k = 0; k < job.planes.size(); ++k) {
+    const PlaneView& plane = job.planes[k];
+    const bool predicts = static_cast<int>(k) == job.light.prediction_plane;
+    RowJob row;
+    int used = 0;
+    for (int c = 0; c < 3; ++c) {
+      row.weight[c] = static_cast<float>(
+          static_cast<double>(job.light.weights[k][static_cast<std::size_t>(c)]) *
+          static_cast<double>(plane.scale));
+      if (row.weight[c] == 0) continue;
+      ++used;
+      row.channel = c;
+    }
+    if (plane.mantissa.empty() || (used == 0 && !predicts)) continue;
+    row.zero = plane.mantissa_zero;
+    const bool has_steps = !plane.exponent.empty();
+    if (has_steps && (stepped == nullptr || !same_steps(*stepped, plane))) {
+      tile_steps<V>(plane, tile, steps);
+      stepped = &plane;
+    }
+    const float* const plane_steps = has_steps ? steps : nullptr;
+    if (used > 0) {
+      run_plane<V>(job, plane, tile, plane_steps, row,
+                   used == 1 ? RowOperation::kAccumulateOne : RowOperation::kAccumulateAll);
+    }
+    if (predicts) {
+      float factors[9][3];
+      fold_prediction(job.light, plane.scale, factors);
+      row.prediction = factors;
+      run_plane<V>(job, plane, tile, plane_steps, row, RowOperation::kPredict);
+    }
+  }
+  saturate<V>(job, tile);
+}
+
+/// The whole light map, tile by tile. Tiles begin at multiples of 1024 columns, so that no sample
+/// of a shared exponent or of 4:2:0 chroma straddles two.
+template <class V>
+RELIT_KERNEL void run_composite(const CompositeJob& job) {
+  for (int x = 0; x < job.width; x += Tile::kTexels) {
+    Tile tile;
+    tile.x = x;
+    tile.width = job.width - x < Tile::kTexels ? job.width - x : Tile::kTexels;
+    const int rows = Tile::kTexels / tile.width;
+    for (tile.y = 0; tile.y < job.height; tile.y += rows) {
+      tile.height = job.height - tile.y < rows ? job.height - tile.y : rows;
+      run_tile<V>(job, tile);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace relit::decoders
