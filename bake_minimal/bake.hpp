@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "bake_minimal/atlas.hpp"
+#include "bake_minimal/coding_options.hpp"
+#include "bake_minimal/ground.hpp"
+#include "bake_minimal/mesh_packer.hpp"
+#include "bake_minimal/pose_encoder.hpp"
+#include "bake_minimal/progress.hpp"
+#include "bake_minimal/scene.hpp"
+#include "bake_minimal/transfer.hpp"
+#include "container/base/result.hpp"
+
+/// From a glTF file to a .relit file: the baker as one call.
+namespace relit::bake {
+
+struct BakeOptions {
+  std::filesystem::path input;
+  std::filesystem::path output;
+  std::filesystem::path reference;  ///< empty, or where the unquantised bake goes as .npy
+  std::optional<std::string> clip;  ///< by name or number; none: the first, or the rest pose
+  container::Rational frame_rate{50, 1};
+  std::uint64_t max_frames = 0;  ///< 0: the whole clip
+  double segment_s = 0.5;
+  bool loop = true;
+  AtlasOptions atlas;
+  std::optional<GroundOptions> ground;
+  TransferOptions transfer;  ///< its width and height are the light map's
+  CodingOptions coding;      ///< segment_frames comes from segment_s
+  PoseChoice pose = PoseChoice::kAuto;
+  bool write_normals = false;
+};
+
+/// What a bake made, for people and for --json.
+struct BakeSummary {
+  std::string clip;
+  std::uint64_t frames = 0;
+  int order = 0, width = 0, height = 0;
+  std::size_t vertices = 0, triangles = 0, samples = 0, covered = 0;
+  AtlasReport atlas;
+  std::uint64_t rays = 0;
+  double trace_s = 0, code_s = 0;
+  std::uint64_t bytes = 0, image_bytes = 0, mesh_bytes = 0, pose_bytes = 0, video_bytes = 0;
+  std::vector<std::string> warnings;
+};
+
+/// The geometry of a packed scene as the tracer takes it. Images are borrowed from `packed`.
+[[nodiscard]] TraceGeometry trace_geometry(const PackedScene& packed);
+
+/// Number of frames k/rate < duration, at least 1.
+[[nodiscard]] std::uint64_t frame_count(double duration_s, const container::Rational& rate);
+
+/// Poses the meshes of a clip frame by frame: positions as the player will have them, from the
+/// packed and quantised pose, normals in full precision from the scene.
+class BakePoser {
+ public:
+  /// Everything is borrowed. Errors: those of decoders::PoseTrack.
+  static Result<BakePoser> create(const Scene& scene, int clip, const PackedScene& packed,
+                                  const PoseEncoding& pose, const container::Rational& frame_rate,
+                                  std::uint32_t segment_frames, std::uint64_t frames);
+  /// Writes `positions()` and `normals()`, of all packed meshes one after another. Errors:
+  /// kInvalid.
+  Status pose(std::uint64_t frame);
+  [[nodiscard]] std::span<const glm::vec3> positions() const { return positions_; }
+  [[nodiscard]] std::span<const glm::vec3> normals() const { return normals_; }
+
+ private:
+  explicit BakePoser(decoders::PoseTrack track) : track_(std::move(track)) {}
+
+  const Scene* scene_ = nullptr;
+  const PackedScene* packed_ = nullptr;
+  int clip_ = -1;
+  container::Rational frame_rate_;
+  decoders::PoseTrack track_;
+  decoders::Pose pose_;
+  ScenePose scene_pose_;
+  std::vector<glm::mat4> world_;
+  std::vector<glm::vec3> positions_, normals_, primitive_positions_, primitive_normals_;
+};
+
+/// Bakes. The output appears under its name when everything is done, and not at all otherwise; the
+/// same options give the same bytes for any number of threads. Errors name the file, the place and
+/// the remedy.
+[[nodiscard]] Result<BakeSummary> bake(const BakeOptions& options, Progress& progress);
+
+}  // namespace relit::bake

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: MIT
+#include <string>
+
+#include "bake_minimal/bake.hpp"
+
+namespace relit::bake {
+
+TraceGeometry trace_geometry(const PackedScene& packed) {
+  TraceGeometry geometry;
+  for (std::size_t m = 0; m < packed.meshes.size(); ++m) {
+    const decoders::Mesh& mesh = packed.meshes[m];
+    const auto base = static_cast<std::uint32_t>(geometry.lightmap_uv.size());
+    const std::vector<glm::vec2>& albedo_uv =
+        mesh.albedo_uv.empty() ? mesh.lightmap_uv : mesh.albedo_uv;
+    geometry.lightmap_uv.insert(geometry.lightmap_uv.end(), mesh.lightmap_uv.begin(),
+                                mesh.lightmap_uv.end());
+    geometry.albedo_uv.insert(geometry.albedo_uv.end(), albedo_uv.begin(), albedo_uv.end());
+    for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
+      geometry.colors.push_back(mesh.colors.empty() ? glm::vec4(1.0f)
+                                                    : glm::vec4(mesh.colors[v]) / 255.0f);
+    }
+    for (const std::uint16_t i : mesh.indices) geometry.indices.push_back(base + i);
+    std::uint32_t material = 0;
+    while (packed.materials.materials[material].id != mesh.material_id) ++material;
+    geometry.surface.insert(geometry.surface.end(), mesh.indices.size() / 3, material);
+  }
+  for (const PackedTriangle& triangle : packed.triangles) {
+    geometry.other_side.push_back(triangle.other_side == kNoTriangle ? kNoOtherSide
+                                                                     : triangle.other_side);
+  }
+  for (const container::MaterialRecord& material : packed.materials.materials) {
+    Surface surface;
+    surface.base_color = {material.base_color[0], material.base_color[1], material.base_color[2],
+                          material.base_color[3]};
+    for (std::size_t i = 0; i < packed.materials.images.size(); ++i) {
+      if (static_cast<std::int64_t>(packed.materials.images[i].id) == material.image_id)
+        surface.image = &packed.materials.texels[i];
+    }
+    surface.wrap_u = material.wrap_u, surface.wrap_v = material.wrap_v;
+    surface.linear_filter = material.linear_filter;
+    surface.masked = material.alpha_mode == container::AlphaMode::kMask;
+    surface.alpha_cutoff = material.alpha_cutoff;
+    geometry.surfaces.push_back(surface);
+  }
+  return geometry;
+}
+
+Result<BakePoser> BakePoser::create(const Scene& scene, int clip, const PackedScene& packed,
+                                    const PoseEncoding& pose, const container::Rational& frame_rate,
+                                    std::uint32_t segment_frames, std::uint64_t frames) {
+  RELIT_ASSIGN(decoders::PoseTrack track,
+               decoders::PoseTrack::create(packed.skeleton, pose.track, packed.meshes));
+  for (std::size_t s = 0; s < pose.packets.size(); ++s) {
+    const std::uint64_t first = s * std::uint64_t{segment_frames};
+    const auto count =
+        static_cast<std::uint32_t>(std::min<std::uint64_t>(segment_frames, frames - first));
+    RELIT_TRY(track.add_packet(pose.packets[s], first, count));
+  }
+  BakePoser poser(std::move(track));
+  poser.scene_ = &scene, poser.packed_ = &packed, poser.clip_ = clip,
+  poser.frame_rate_ = frame_rate;
+  std::size_t vertices = 0;
+  for (const decoders::Mesh& mesh : packed.meshes) vertices += mesh.positions.size();
+  poser.positions_.resize(vertices), poser.normals_.resize(vertices);
+  return poser;
+}
+
+Status BakePoser::pose(std::uint64_t frame) {
+  RELIT_TRY(track_.sample(static_cast<double>(frame), pose_));
+  const double time_s = static_cast<double>(frame) * static_cast<double>(frame_rate_.den) /
+                        static_cast<double>(frame_rate_.num);
+  scene_->sample(clip_, time_s, scene_pose_);
+  scene_->world_matrices(scene_pose_, world_);
+  std::size_t first = 0;
+  std::uint32_t posed_primitive = kNoTriangle;
+  for (std::size_t m = 0; m < packed_->meshes.size(); ++m) {
+    const decoders::Mesh& mesh = packed_->meshes[m];
+    const PackedMeshSource& source = packed_->sources[m];
+    const std::span<glm::vec3> positions(positions_.data() + first, mesh.positions.size());
+    decoders::pose_mesh(mesh, m, pose_, positions, {});
+    const Primitive& primitive = scene_->primitives[source.primitive];
+    if (source.primitive != posed_primitive) {
+      primitive_positions_.resize(primitive.positions.size());
+      primitive_normals_.resize(primitive.positions.size());
+      scene_->pose_primitive(primitive, scene_pose_, world_, primitive_positions_,
+                             primitive_normals_);
+      posed_primitive = source.primitive;
+    }
+    for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
+      normals_[first + v] = primitive_normals_[source.source_vertex[v]];
+    }
+    first += mesh.positions.size();
+  }
+  return {};
+}
+
+}  // namespace relit::bake
