@@ -1,0 +1,224 @@
+// SPDX-License-Identifier: MIT
+#include "player/clip_reader.hpp"
+
+#include <algorithm>
+
+namespace relit::player {
+namespace {
+
+// A number that is not a clip's name counts clips.
+const container::ClipRecord* find_clip(const std::vector<container::ClipRecord>& clips,
+                                       const std::string& wanted) {
+  if (wanted.empty()) return &clips.front();
+  for (const container::ClipRecord& clip : clips) {
+    if (clip.name == wanted) return &clip;
+  }
+  if (wanted.size() > 6 || wanted.find_first_not_of("0123456789") != std::string::npos)
+    return nullptr;
+  const auto number = static_cast<std::size_t>(std::stoul(wanted));
+  return number < clips.size() ? &clips[number] : nullptr;
+}
+
+}  // namespace
+
+Unexpected ClipReader::in_file(const Error& error) const {
+  return fail(error.code, name_ + ": " + error.message);
+}
+
+Status ClipReader::choose_clip(const std::string& wanted) {
+  const container::ClipRecord* clip = find_clip(contents_.clips, wanted);
+  if (clip == nullptr) {
+    std::string names;
+    for (const container::ClipRecord& c : contents_.clips)
+      names += (names.empty() ? "" : ", ") + c.name;
+    return fail(ErrorCode::kNotFound, name_ + ": no clip \"" + wanted + "\"; there are: " + names);
+  }
+  clip_ = *clip;
+  const auto model =
+      std::find_if(contents_.models.begin(), contents_.models.end(),
+                   [&](const container::ModelRecord& m) { return m.clip_id == clip_.id; });
+  const auto pose =
+      std::find_if(contents_.pose_tracks.begin(), contents_.pose_tracks.end(),
+                   [&](const container::PoseTrackRecord& p) { return p.clip_id == clip_.id; });
+  if (model == contents_.models.end() || pose == contents_.pose_tracks.end()) {
+    return fail(ErrorCode::kUnsupported,
+                name_ + ": clip \"" + clip_.name + "\" has no appearance model or no pose track");
+  }
+  model_ = *model;
+  layers_ = contents_.layers_of(model_.id);
+  pose_track_ = pose->track_id;
+  for (const container::MeshRecord& record : contents_.meshes) {
+    auto mesh = decoders::decode_mesh(record, contents_.skeleton.palette.size(),
+                                      contents_.skeleton.morph_weight_count);
+    if (!mesh) return in_file(mesh.error());
+    meshes_.push_back(std::move(*mesh));
+  }
+  auto track = decoders::PoseTrack::create(contents_.skeleton, *pose, meshes_);
+  if (!track) return in_file(track.error());
+  poses_ = std::move(*track);
+  return {};
+}
+
+Result<ClipReader> ClipReader::open(std::unique_ptr<container::ByteSource> source,
+                                    const std::string& name, const ClipOptions& options) {
+  auto reader = container::Reader::open(std::move(source));
+  if (!reader) return fail(reader.error().code, name + ": " + reader.error().message);
+  ClipReader clip(std::move(*reader), name);
+  auto contents = container::load_static(clip.reader_);
+  if (!contents) return clip.in_file(contents.error());
+  clip.contents_ = std::move(*contents);
+  RELIT_TRY(clip.choose_clip(options.clip));
+  std::vector<std::uint32_t> tracks{clip.pose_track_};
+  if (options.planes) {
+    std::vector<std::uint8_t> wanted(clip.layers_.size(), 1);
+    for (std::size_t i = 0; i < wanted.size(); ++i) {
+      if (options.layers >= 0 && i >= static_cast<std::size_t>(options.layers)) wanted[i] = 0;
+      if (wanted[i] == 0) continue;
+      tracks.push_back(clip.layers_[i].mantissa_track);
+      if (clip.layers_[i].has_exponents) tracks.push_back(clip.layers_[i].exponent_track);
+    }
+    auto planes =
+        decoders::PlaneDecoder::open(clip.model_, clip.layers_, {options.threads, wanted});
+    if (!planes) return clip.in_file(planes.error());
+    clip.planes_ = std::move(*planes);
+  }
+  std::sort(tracks.begin(), tracks.end());
+  clip.tracks_ = tracks;
+  clip.reader_.set_wanted_tracks(std::move(tracks));
+  return clip;
+}
+
+// Damage costs the frames it hit; what comes from the source itself ends playback.
+Status ClipReader::note_damage(const Error& error) {
+  if (error.code == ErrorCode::kIo || error.code == ErrorCode::kCancelled ||
+      error.code == ErrorCode::kUnsupported) {
+    return in_file(error);
+  }
+  if (loss_.first.empty()) loss_.first = name_ + ": " + error.message;
+  return {};
+}
+
+Status ClipReader::take(container::Record record) {
+  if (auto* segment = std::get_if<container::SegmentRecord>(&record.body)) {
+    if (segment_) complete_end_ = segment_->first_frame + segment_->frame_count;
+    segment_.reset();
+    if (segment->clip_id != clip_.id) {
+      reader_.skip_segment();
+      return {};
+    }
+    seen_.push_back({segment->index, segment->clip_id, segment->first_frame, segment->frame_count,
+                     record.offset_bytes});
+    segment_ = std::move(*segment);
+    for (const auto& chunk : segment_->chunks) {
+      if (std::binary_search(tracks_.begin(), tracks_.end(), chunk.track_id))
+        last_chunk_ = chunk.track_id;
+    }
+    return {};
+  }
+  auto* chunk = std::get_if<container::ChunkRecord>(&record.body);
+  if (chunk == nullptr || !segment_) return {};
+  // Chunks come in the order that the segment lists: after the last one it need not be waited for.
+  if (chunk->track_id == last_chunk_) complete_end_ = segment_->first_frame + segment_->frame_count;
+  if (chunk->track_id != pose_track_) {
+    if (!planes_) return {};
+    const Status status = planes_->add_chunk(*segment_, std::move(*chunk));
+    return status ? status : note_damage(status.error());
+  }
+  if (chunk->packets.empty()) return {};
+  const container::Packet& packet = chunk->packets.front();
+  const std::span<const std::uint8_t> bytes(chunk->data.data() + packet.offset, packet.size);
+  const Status status = poses_->add_packet(bytes, segment_->first_frame, segment_->frame_count);
+  return status ? status : note_damage(status.error());
+}
+
+Status ClipReader::read_until(std::uint64_t index) {
+  while (!ended_ && complete_end_ <= index) {
+    auto record = reader_.next();
+    if (record && *record) {
+      RELIT_TRY(take(std::move(**record)));
+      continue;
+    }
+    if (record) {
+      ended_ = true;
+      break;
+    }
+    RELIT_TRY(note_damage(record.error()));
+    if (reader_.can_continue()) continue;
+    segment_.reset();
+    auto found = reader_.resync();
+    if (!found) return in_file(found.error());
+    ended_ = !*found;
+  }
+  return {};
+}
+
+// Goes to the segment of a frame that is not the next one, where the source can seek and the place
+// is known.
+Result<bool> ClipReader::jump(std::uint64_t index) {
+  if (!reader_.seekable()) return false;
+  if (!index_) {
+    // A file without an index was cut, or is still being written: what has been read so far serves
+    // as one.
+    auto found = reader_.read_index();
+    if (!found && found.error().code == ErrorCode::kIo) return in_file(found.error());
+    index_ = found ? std::move(*found) : container::IndexRecord{};
+  }
+  const auto holds = [&](const container::IndexRecord::Entry& e) {
+    return e.clip_id == clip_.id && e.first_frame <= index && index < e.first_frame + e.frame_count;
+  };
+  auto entry = std::find_if(index_->segments.begin(), index_->segments.end(), holds);
+  if (entry == index_->segments.end()) {
+    entry = std::find_if(seen_.begin(), seen_.end(), holds);
+    if (entry == seen_.end()) return false;
+  }
+  const container::IndexRecord::Entry target = *entry;
+  if (const Status status = reader_.seek_to_segment(target); !status) {
+    RELIT_TRY(note_damage(status.error()));
+    auto found = reader_.resync();
+    if (!found) return in_file(found.error());
+  }
+  segment_.reset();
+  ended_ = false;
+  complete_end_ = kept_begin_ = target.first_frame;
+  return true;
+}
+
+Status ClipReader::frame(std::uint64_t index, ClipFrame& out) {
+  if (index >= clip_.frame_count) {
+    return fail(ErrorCode::kNotFound, name_ + ": no frame " + std::to_string(index) + "; clip \"" +
+                                          clip_.name + "\" has " +
+                                          std::to_string(clip_.frame_count) + " frames, from 0 on");
+  }
+  const bool back = index < kept_begin_;
+  const bool ahead = index >= complete_end_ &&
+                     !(segment_ && index < segment_->first_frame + segment_->frame_count);
+  if (back || (ahead && index > complete_end_)) {
+    RELIT_ASSIGN(const bool jumped, jump(index));
+    if (back && !jumped) {
+      return fail(ErrorCode::kNotFound, name_ + ": frame " + std::to_string(index) +
+                                            " has gone by, and this source cannot go back");
+    }
+  }
+  RELIT_TRY(read_until(index));
+  Status decoded = poses_->sample(static_cast<double>(index), scratch_.pose);
+  if (decoded && planes_) decoded = planes_->frame(index, scratch_.planes);
+  if (decoded) {
+    std::swap(out, scratch_);
+    shown_ = true;
+    forget_before(index);
+    return {};
+  }
+  RELIT_TRY(note_damage(decoded.error()));
+  if (!shown_) return in_file(decoded.error());
+  ++loss_.frames;
+  return {};
+}
+
+void ClipReader::forget_before(std::uint64_t index) {
+  if (!segment_ || segment_->first_frame > index || segment_->first_frame == kept_begin_) return;
+  kept_begin_ = segment_->first_frame;
+  poses_->forget_before(kept_begin_);
+  if (planes_) planes_->forget_before(kept_begin_);
+}
+
+}  // namespace relit::player

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "container/base/result.hpp"
+#include "container/byte_source.hpp"
+#include "container/reader.hpp"
+#include "decoders/mesh.hpp"
+#include "decoders/plane_decoder.hpp"
+#include "decoders/pose.hpp"
+
+namespace relit::player {
+
+struct ClipOptions {
+  std::string clip;    ///< by name or number; empty: the first
+  int layers = -1;     ///< decode so many layers, from the most important on; -1: all
+  int threads = 1;     ///< of each mantissa decoder
+  bool planes = true;  ///< false: poses only
+};
+
+/// What was lost to damage so far.
+struct PlaybackLoss {
+  std::uint64_t frames = 0;  ///< shown with older planes or poses
+  std::string first;         ///< the first reason, for the user
+  [[nodiscard]] bool any() const { return frames != 0 || !first.empty(); }
+};
+
+/// One frame, decoded. Reuse one object from frame to frame.
+struct ClipFrame {
+  decoders::FrameView planes;
+  decoders::Pose pose;
+};
+
+/// One clip of a file as a sequence of frames: reads segments as they are needed, decodes planes
+/// and poses, holds the last good frame over damage, and says what was lost. Going forward never
+/// seeks; going back needs a source that can. One thread at a time.
+class ClipReader {
+ public:
+  /// Reads everything static. `name` is for messages. Errors: those of the reader and the decoders;
+  /// kNotFound for a clip that is not there (names those that are).
+  static Result<ClipReader> open(std::unique_ptr<container::ByteSource> source,
+                                 const std::string& name, const ClipOptions& options);
+
+  [[nodiscard]] const container::FileContents& contents() const { return contents_; }
+  [[nodiscard]] const container::ClipRecord& clip() const { return clip_; }
+  [[nodiscard]] const container::ModelRecord& model() const { return model_; }
+  [[nodiscard]] const std::vector<container::LayerRecord>& layers() const { return layers_; }
+  [[nodiscard]] const std::vector<decoders::Mesh>& meshes() const { return meshes_; }
+  [[nodiscard]] const PlaybackLoss& loss() const { return loss_; }
+
+  /// Decodes frame `index` of the clip. Errors: kNotFound beyond the clip, or behind what was read
+  /// where the source cannot seek, or when nothing that could be shown has arrived; kIo,
+  /// kCancelled. Damage is no error once a frame has been shown: the last one stays and loss()
+  /// counts.
+  Status frame(std::uint64_t index, ClipFrame& out);
+
+ private:
+  ClipReader(container::Reader reader, std::string name)
+      : reader_(std::move(reader)), name_(std::move(name)) {}
+
+  Status choose_clip(const std::string& wanted);
+  Status read_until(std::uint64_t index);
+  Result<bool> jump(std::uint64_t index);
+  Status take(container::Record record);
+  Status note_damage(const Error& error);
+  void forget_before(std::uint64_t index);
+  [[nodiscard]] Unexpected in_file(const Error& error) const;
+
+  container::Reader reader_;
+  std::string name_;
+  container::FileContents contents_;
+  container::ClipRecord clip_;
+  container::ModelRecord model_;
+  std::vector<container::LayerRecord> layers_;
+  std::uint32_t pose_track_ = 0;
+  std::vector<decoders::Mesh> meshes_;
+  std::optional<decoders::PoseTrack> poses_;
+  std::optional<decoders::PlaneDecoder> planes_;
+  std::vector<std::uint32_t> tracks_;  ///< wanted, sorted
+  std::optional<container::IndexRecord> index_;
+  std::vector<container::IndexRecord::Entry> seen_;  ///< segments of the clip that went by
+  std::optional<container::SegmentRecord> segment_;  ///< whose chunks are coming in
+  std::uint32_t last_chunk_ = 0;                     ///< track of the last one that is wanted
+  std::uint64_t complete_end_ = 0;                   ///< frames before this one have come
+  std::uint64_t kept_begin_ = 0;                     ///< frames before this one have been forgotten
+  ClipFrame scratch_;
+  bool ended_ = false;
+  bool shown_ = false;
+  PlaybackLoss loss_;
+};
+
+}  // namespace relit::player
