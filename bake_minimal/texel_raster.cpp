@@ -27,31 +27,6 @@ std::int64_t cross(glm::i64vec2 a, glm::i64vec2 b, glm::i64vec2 p) {
   return (b.x - a.x) * (p.y - a.y) - (b.y - a.y) * (p.x - a.x);
 }
 
-struct Interval {
-  double lo = std::numeric_limits<double>::infinity();
-  double hi = -std::numeric_limits<double>::infinity();
-  void add(double v) {
-    lo = std::min(lo, v);
-    hi = std::max(hi, v);
-  }
-};
-
-// The x extent of the triangle within the closed slab y0 <= y <= y1, in texels.
-Interval slab_extent(const std::array<glm::dvec2, 3>& p, double y0, double y1) {
-  Interval extent;
-  for (std::size_t i = 0; i < 3; ++i) {
-    const glm::dvec2 a = p[i];
-    const glm::dvec2 b = p[(i + 1) % 3];
-    if (a.y >= y0 && a.y <= y1) extent.add(a.x);
-    for (const double y : {y0, y1}) {
-      if ((a.y < y && b.y > y) || (a.y > y && b.y < y)) {
-        extent.add(a.x + (b.x - a.x) * ((y - a.y) / (b.y - a.y)));
-      }
-    }
-  }
-  return extent;
-}
-
 struct Nearest {
   double distance2;
   double b1, b2;
@@ -123,14 +98,14 @@ class AtlasRaster {
     const FixedTriangle fixed = make_triangle(t);
     if (fixed.degenerate()) return;
     const std::array<glm::dvec2, 3> p = fixed.texels();
-    Interval ys;
-    for (const glm::dvec2 v : p) ys.add(v.y);
+    const double lo = std::min({p[0].y, p[1].y, p[2].y});
+    const double hi = std::max({p[0].y, p[1].y, p[2].y});
     // Closed squares: one that shares no more than its side with the triangle counts, since a
     // bilinear fetch on that side reads half of it.
-    const int y0 = static_cast<int>(std::max(0.0, std::ceil(ys.lo) - 1));
-    const int y1 = static_cast<int>(std::min(height_ - 1.0, std::floor(ys.hi)));
+    const int y0 = static_cast<int>(std::max(0.0, std::ceil(lo) - 1));
+    const int y1 = static_cast<int>(std::min(height_ - 1.0, std::floor(hi)));
     for (int y = y0; y <= y1; ++y) {
-      const Interval xs = slab_extent(p, y, y + 1.0);
+      const SlabExtent xs = slab_extent(p, y, y + 1.0);
       const int x0 = static_cast<int>(std::max(0.0, std::ceil(xs.lo) - 1));
       const int x1 = static_cast<int>(std::min(width_ - 1.0, std::floor(xs.hi)));
       for (int x = x0; x <= x1; ++x) {
@@ -174,7 +149,27 @@ class AtlasRaster {
   std::vector<Candidate> candidates_;
 };
 
+void extend(SlabExtent& extent, double v) {
+  extent.lo = std::min(extent.lo, v);
+  extent.hi = std::max(extent.hi, v);
+}
+
 }  // namespace
+
+SlabExtent slab_extent(const std::array<glm::dvec2, 3>& p, double y0, double y1) {
+  SlabExtent extent;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const glm::dvec2 a = p[i];
+    const glm::dvec2 b = p[(i + 1) % 3];
+    if (a.y >= y0 && a.y <= y1) extend(extent, a.x);
+    for (const double y : {y0, y1}) {
+      if ((a.y < y && b.y > y) || (a.y > y && b.y < y)) {
+        extend(extent, a.x + (b.x - a.x) * ((y - a.y) / (b.y - a.y)));
+      }
+    }
+  }
+  return extent;
+}
 
 FixedTriangle::FixedTriangle(glm::vec2 a, glm::vec2 b, glm::vec2 c, int width, int height) {
   const std::array<glm::vec2, 3> corners{a, b, c};

@@ -4,8 +4,18 @@
 #include <array>
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <limits>
 
 namespace relit::bake {
+
+/// An interval of x; empty when hi < lo.
+struct SlabExtent {
+  double lo = std::numeric_limits<double>::infinity();
+  double hi = -std::numeric_limits<double>::infinity();
+};
+
+/// The x extent of the part of a triangle that lies in the closed slab y0 <= y <= y1.
+[[nodiscard]] SlabExtent slab_extent(const std::array<glm::dvec2, 3>& p, double y0, double y1);
 
 /// A triangle of light-map UVs on a width × height atlas, its corners rounded to 1/4096 texel, in
 /// integer arithmetic from there on: which texel centres it owns is exact. Owned = strictly inside,

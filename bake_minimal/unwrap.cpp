@@ -1,0 +1,279 @@
+// SPDX-License-Identifier: MIT
+#include "bake_minimal/unwrap.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <queue>
+#include <tuple>
+
+#include "bake_minimal/texel_raster.hpp"
+#include "bake_minimal/unwrap_charts.hpp"
+
+namespace relit::bake {
+namespace {
+
+// How much of the atlas charts come to fill; only used to tell which ones are too long for it.
+constexpr double kExpectedFill = 0.65;
+// Triangles that may be laid flat in trial unions, over those of the surface: bounds the time.
+constexpr std::size_t kMergeEffort = 20;
+constexpr double kLeastShapeFill = 0.35;  // of the bounding rectangle, after a union
+
+FlattenLimits cut_limits(const Surface& surface, const PackOptions& options) {
+  double area = 0;
+  for (const double a : surface.areas) area += a;
+  const double texels = double{kExpectedFill} * options.width * options.height;
+  const double metres_a_texel = std::sqrt(area / texels);
+  FlattenLimits limits;
+  limits.greatest_side = 0.95 * metres_a_texel * std::max(options.width, options.height);
+  limits.greatest_short_side = 0.95 * metres_a_texel * std::min(options.width, options.height);
+  return limits;
+}
+
+FlattenLimits union_limits(FlattenLimits limits) {
+  limits.least_density = 0.85;
+  limits.greatest_density = 1.18;
+  limits.greatest_anisotropy = 1.6;
+  limits.least_fill = kLeastShapeFill;
+  return limits;
+}
+
+// Lays a patch flat, in as many pieces as it takes.
+void flatten_pieces(const Surface& surface, std::vector<std::uint32_t> patch,
+                    const FlattenLimits& limits, std::vector<FlatChart>& charts) {
+  std::vector<std::vector<std::uint32_t>> stack{std::move(patch)};
+  while (!stack.empty()) {
+    const std::vector<std::uint32_t> piece = std::move(stack.back());
+    stack.pop_back();
+    if (auto chart = flatten_patch(surface, piece, limits)) {
+      charts.push_back(*std::move(chart));
+      continue;
+    }
+    auto parts = split_patch(surface, piece);
+    stack.push_back(std::move(parts[1]));
+    stack.push_back(std::move(parts[0]));
+  }
+}
+
+class Merger {
+ public:
+  Merger(const Surface& surface, std::vector<FlatChart> charts, const FlattenLimits& limits)
+      : surface_(surface),
+        limits_(limits),
+        charts_(std::move(charts)),
+        version_(charts_.size(), 0),
+        chart_of_(surface.triangles.size(), kNoTriangle) {
+    for (std::uint32_t c = 0; c < charts_.size(); ++c) claim(c);
+  }
+
+  std::vector<FlatChart> run() {
+    for (std::uint32_t c = 0; c < charts_.size(); ++c) push_pairs(c, true);
+    std::size_t effort = 0;
+    while (!queue_.empty() && effort < kMergeEffort * surface_.triangles.size()) {
+      const Pair pair = queue_.top();
+      queue_.pop();
+      if (version_[pair.a] != pair.version_a || version_[pair.b] != pair.version_b) continue;
+      std::vector<std::uint32_t> both = charts_[pair.a].triangles;
+      const auto& other = charts_[pair.b].triangles;
+      both.insert(both.end(), other.begin(), other.end());
+      std::sort(both.begin(), both.end());
+      effort += both.size();
+      auto merged = flatten_patch(surface_, both, limits_);
+      if (!merged) continue;
+      charts_[pair.a] = *std::move(merged);
+      charts_[pair.b].triangles.clear();
+      ++version_[pair.a];
+      ++version_[pair.b];
+      claim(pair.a);
+      push_pairs(pair.a, false);
+    }
+    std::erase_if(charts_, [](const FlatChart& c) { return c.triangles.empty(); });
+    return std::move(charts_);
+  }
+
+ private:
+  struct Pair {
+    double score;
+    std::uint32_t a, b;
+    std::uint32_t version_a, version_b;
+    bool operator<(const Pair& o) const {
+      return std::tie(score, o.a, o.b) < std::tie(o.score, a, b);
+    }
+  };
+
+  void claim(std::uint32_t c) {
+    for (const std::uint32_t t : charts_[c].triangles) chart_of_[t] = c;
+  }
+
+  void push_pairs(std::uint32_t c, bool only_later) {
+    std::map<std::uint32_t, double> shared;
+    for (const std::uint32_t t : charts_[c].triangles) {
+      for (std::size_t i = 0; i < 3; ++i) {
+        const std::uint32_t n = surface_.neighbours[t][i];
+        if (n == kNoTriangle || chart_of_[n] == c) continue;
+        // A crease is the better place for a seam.
+        const double worth = surface_.creases[t][i] ? 0.5 : 1.0;
+        shared[chart_of_[n]] += worth * surface_.edge_length(t, i);
+      }
+    }
+    for (const auto& [other, length] : shared) {
+      if (only_later && other < c) continue;
+      const double outline = std::min(charts_[c].outline, charts_[other].outline);
+      if (!(outline > 0)) continue;
+      const std::uint32_t a = std::min(c, other), b = std::max(c, other);
+      queue_.push({length / outline, a, b, version_[a], version_[b]});
+    }
+  }
+
+  const Surface& surface_;
+  const FlattenLimits& limits_;
+  std::vector<FlatChart> charts_;
+  std::vector<std::uint32_t> version_;
+  std::vector<std::uint32_t> chart_of_;
+  std::priority_queue<Pair> queue_;
+};
+
+// Charts with a texel that two of their own triangles own, at the baked size.
+std::vector<bool> self_overlapping(std::span<const FlatChart> charts, std::span<const glm::vec2> uv,
+                                   const PackOptions& options) {
+  std::vector<std::uint32_t> owner(
+      static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height),
+      kNoTriangle);
+  std::vector<bool> bad(charts.size(), false);
+  for (std::uint32_t c = 0; c < charts.size(); ++c) {
+    for (const std::uint32_t t : charts[c].triangles) {
+      const std::size_t k = 3 * static_cast<std::size_t>(t);
+      FixedTriangle(uv[k], uv[k + 1], uv[k + 2], options.width, options.height)
+          .for_each_row(options.width, options.height, [&](int y, int x0, int x1) {
+            for (int x = x0; x <= x1; ++x) {
+              auto& o =
+                  owner[static_cast<std::size_t>(y) * static_cast<std::size_t>(options.width) +
+                        static_cast<std::size_t>(x)];
+              if (o == c) bad[c] = true;
+              o = c;
+            }
+          });
+    }
+  }
+  return bad;
+}
+
+bool cut_overlapping(const Surface& surface, const FlattenLimits& limits,
+                     const std::vector<bool>& bad, std::vector<FlatChart>& charts) {
+  std::vector<FlatChart> next;
+  bool changed = false;
+  for (std::size_t c = 0; c < charts.size(); ++c) {
+    if (!bad[c] || charts[c].triangles.size() < 2) {
+      next.push_back(std::move(charts[c]));
+      continue;
+    }
+    changed = true;
+    for (auto& part : split_patch(surface, charts[c].triangles)) {
+      flatten_pieces(surface, std::move(part), limits, next);
+    }
+  }
+  charts = std::move(next);
+  return changed;
+}
+
+// Triangles without area: all three corners at one place that a neighbour knows, so that they own
+// no texel and read a sensible one should they open up later in the clip.
+void place_degenerate(const Surface& surface, std::vector<glm::vec2>& uv) {
+  std::vector<std::optional<glm::vec2>> known(surface.points.size());
+  std::vector<std::uint32_t> waiting;
+  glm::vec2 anywhere(0.5f);
+  bool any = false;
+  for (std::uint32_t t = 0; t < surface.triangles.size(); ++t) {
+    if (surface.areas[t] <= 0) {
+      waiting.push_back(t);
+      continue;
+    }
+    for (std::size_t i = 0; i < 3; ++i) {
+      auto& k = known[surface.triangles[t][i]];
+      if (!k) k = uv[3 * static_cast<std::size_t>(t) + i];
+    }
+    if (!any) anywhere = uv[3 * static_cast<std::size_t>(t)];
+    any = true;
+  }
+  const auto settle = [&](std::uint32_t t, const glm::vec2& place) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      uv[3 * static_cast<std::size_t>(t) + i] = place;
+      auto& k = known[surface.triangles[t][i]];
+      if (!k) k = place;
+    }
+  };
+  for (bool changed = true; changed && !waiting.empty();) {
+    const std::size_t before = waiting.size();
+    std::erase_if(waiting, [&](std::uint32_t t) {
+      for (const std::uint32_t p : surface.triangles[t]) {
+        if (!known[p]) continue;
+        settle(t, *known[p]);
+        return true;
+      }
+      return false;
+    });
+    changed = waiting.size() != before;
+  }
+  for (const std::uint32_t t : waiting) settle(t, anywhere);
+}
+
+}  // namespace
+
+std::vector<FlatChart> make_charts(const Surface& surface, const PackOptions& options) {
+  const FlattenLimits limits = cut_limits(surface, options);
+  std::vector<FlatChart> charts;
+  for (auto& patch : grow_patches(surface)) {
+    flatten_pieces(surface, std::move(patch), limits, charts);
+  }
+  return Merger(surface, std::move(charts), union_limits(limits)).run();
+}
+
+PackShape to_shape(const FlatChart& chart) {
+  PackShape shape;
+  shape.points = chart.uv;
+  for (std::size_t k = 0; k + 2 < chart.corners.size(); k += 3) {
+    shape.triangles.push_back({chart.corners[k], chart.corners[k + 1], chart.corners[k + 2]});
+  }
+  return shape;
+}
+
+glm::vec2 snap_uv(const glm::dvec2& uv) {
+  return glm::vec2(glm::round(glm::clamp(uv, 0.0, 1.0) * 65535.0) / 65535.0);
+}
+
+std::vector<glm::vec2> corner_uvs(const Surface& surface, std::span<const FlatChart> charts,
+                                  std::span<const std::vector<glm::dvec2>> texels,
+                                  const PackOptions& options) {
+  std::vector<glm::vec2> uv(3 * surface.triangles.size(), glm::vec2(0.5f));
+  const glm::dvec2 size(options.width, options.height);
+  for (std::size_t c = 0; c < charts.size(); ++c) {
+    for (std::size_t i = 0; i < charts[c].triangles.size(); ++i) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        uv[3 * static_cast<std::size_t>(charts[c].triangles[i]) + k] =
+            snap_uv(texels[c][charts[c].corners[3 * i + k]] / size);
+      }
+    }
+  }
+  place_degenerate(surface, uv);
+  return uv;
+}
+
+Result<Unwrapped> unwrap_surface(const SurfaceInput& input, const PackOptions& options) {
+  const Surface surface(input);
+  std::vector<FlatChart> charts = make_charts(surface, options);
+  const FlattenLimits limits = cut_limits(surface, options);
+  while (true) {
+    std::vector<PackShape> shapes;
+    for (const FlatChart& c : charts) shapes.push_back(to_shape(c));
+    RELIT_ASSIGN(const PackResult packed, pack_shapes(shapes, options));
+    Unwrapped out;
+    out.corner_uv = corner_uvs(surface, charts, packed.points, options);
+    out.charts = static_cast<int>(charts.size());
+    // Overlaps finer than the check within a chart; every round cuts, so this ends.
+    const std::vector<bool> bad = self_overlapping(charts, out.corner_uv, options);
+    if (!cut_overlapping(surface, limits, bad, charts)) return out;
+  }
+}
+
+}  // namespace relit::bake
