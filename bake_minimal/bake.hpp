@@ -50,6 +50,26 @@ struct BakeSummary {
   std::vector<std::string> warnings;
 };
 
+/// Everything that a bake knows before it traces the first ray.
+struct PreparedBake {
+  Scene scene;
+  int clip = -1;  ///< into scene.clips; -1: the rest pose
+  container::Rational frame_rate;
+  std::uint64_t frames = 1;
+  std::uint32_t segment_frames = 25;
+  AtlasReport atlas;
+  PackedScene packed;
+  PoseEncoding pose;
+  std::vector<TexelSample> samples;  ///< on the packed triangles
+
+  /// Time of a frame, in seconds.
+  [[nodiscard]] double time_s(std::uint64_t frame) const;
+};
+
+/// Loads, unwraps, packs and quantises: all of a bake but transfer and coding. Errors name the
+/// file, the place and the remedy.
+[[nodiscard]] Result<PreparedBake> prepare_bake(const BakeOptions& options);
+
 /// The geometry of a packed scene as the tracer takes it. Images are borrowed from `packed`.
 [[nodiscard]] TraceGeometry trace_geometry(const PackedScene& packed);
 
@@ -60,23 +80,19 @@ struct BakeSummary {
 /// packed and quantised pose, normals in full precision from the scene.
 class BakePoser {
  public:
-  /// Everything is borrowed. Errors: those of decoders::PoseTrack.
-  static Result<BakePoser> create(const Scene& scene, int clip, const PackedScene& packed,
-                                  const PoseEncoding& pose, const container::Rational& frame_rate,
-                                  std::uint32_t segment_frames, std::uint64_t frames);
-  /// Writes `positions()` and `normals()`, of all packed meshes one after another. Errors:
-  /// kInvalid.
+  /// `prepared` is borrowed. Errors: those of decoders::PoseTrack.
+  static Result<BakePoser> create(const PreparedBake& prepared);
+  /// Writes positions() and normals(), of all packed meshes one after another. Errors: those of
+  /// decoders::PoseTrack.
   Status pose(std::uint64_t frame);
   [[nodiscard]] std::span<const glm::vec3> positions() const { return positions_; }
   [[nodiscard]] std::span<const glm::vec3> normals() const { return normals_; }
 
  private:
-  explicit BakePoser(decoders::PoseTrack track) : track_(std::move(track)) {}
+  BakePoser(const PreparedBake& prepared, decoders::PoseTrack track)
+      : prepared_(&prepared), track_(std::move(track)) {}
 
-  const Scene* scene_ = nullptr;
-  const PackedScene* packed_ = nullptr;
-  int clip_ = -1;
-  container::Rational frame_rate_;
+  const PreparedBake* prepared_;
   decoders::PoseTrack track_;
   decoders::Pose pose_;
   ScenePose scene_pose_;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <string>
+#include <algorithm>
 
 #include "bake_minimal/bake.hpp"
 
@@ -45,20 +45,17 @@ TraceGeometry trace_geometry(const PackedScene& packed) {
   return geometry;
 }
 
-Result<BakePoser> BakePoser::create(const Scene& scene, int clip, const PackedScene& packed,
-                                    const PoseEncoding& pose, const container::Rational& frame_rate,
-                                    std::uint32_t segment_frames, std::uint64_t frames) {
+Result<BakePoser> BakePoser::create(const PreparedBake& prepared) {
+  const PackedScene& packed = prepared.packed;
   RELIT_ASSIGN(decoders::PoseTrack track,
-               decoders::PoseTrack::create(packed.skeleton, pose.track, packed.meshes));
-  for (std::size_t s = 0; s < pose.packets.size(); ++s) {
-    const std::uint64_t first = s * std::uint64_t{segment_frames};
-    const auto count =
-        static_cast<std::uint32_t>(std::min<std::uint64_t>(segment_frames, frames - first));
-    RELIT_TRY(track.add_packet(pose.packets[s], first, count));
+               decoders::PoseTrack::create(packed.skeleton, prepared.pose.track, packed.meshes));
+  for (std::size_t s = 0; s < prepared.pose.packets.size(); ++s) {
+    const std::uint64_t first = s * std::uint64_t{prepared.segment_frames};
+    const std::uint64_t count =
+        std::min<std::uint64_t>(prepared.segment_frames, prepared.frames - first);
+    RELIT_TRY(track.add_packet(prepared.pose.packets[s], first, static_cast<std::uint32_t>(count)));
   }
-  BakePoser poser(std::move(track));
-  poser.scene_ = &scene, poser.packed_ = &packed, poser.clip_ = clip,
-  poser.frame_rate_ = frame_rate;
+  BakePoser poser(prepared, std::move(track));
   std::size_t vertices = 0;
   for (const decoders::Mesh& mesh : packed.meshes) vertices += mesh.positions.size();
   poser.positions_.resize(vertices), poser.normals_.resize(vertices);
@@ -66,24 +63,24 @@ Result<BakePoser> BakePoser::create(const Scene& scene, int clip, const PackedSc
 }
 
 Status BakePoser::pose(std::uint64_t frame) {
+  const PackedScene& packed = prepared_->packed;
+  const Scene& scene = prepared_->scene;
   RELIT_TRY(track_.sample(static_cast<double>(frame), pose_));
-  const double time_s = static_cast<double>(frame) * static_cast<double>(frame_rate_.den) /
-                        static_cast<double>(frame_rate_.num);
-  scene_->sample(clip_, time_s, scene_pose_);
-  scene_->world_matrices(scene_pose_, world_);
+  scene.sample(prepared_->clip, prepared_->time_s(frame), scene_pose_);
+  scene.world_matrices(scene_pose_, world_);
   std::size_t first = 0;
   std::uint32_t posed_primitive = kNoTriangle;
-  for (std::size_t m = 0; m < packed_->meshes.size(); ++m) {
-    const decoders::Mesh& mesh = packed_->meshes[m];
-    const PackedMeshSource& source = packed_->sources[m];
+  for (std::size_t m = 0; m < packed.meshes.size(); ++m) {
+    const decoders::Mesh& mesh = packed.meshes[m];
+    const PackedMeshSource& source = packed.sources[m];
     const std::span<glm::vec3> positions(positions_.data() + first, mesh.positions.size());
     decoders::pose_mesh(mesh, m, pose_, positions, {});
-    const Primitive& primitive = scene_->primitives[source.primitive];
+    const Primitive& primitive = scene.primitives[source.primitive];
     if (source.primitive != posed_primitive) {
       primitive_positions_.resize(primitive.positions.size());
       primitive_normals_.resize(primitive.positions.size());
-      scene_->pose_primitive(primitive, scene_pose_, world_, primitive_positions_,
-                             primitive_normals_);
+      scene.pose_primitive(primitive, scene_pose_, world_, primitive_positions_,
+                           primitive_normals_);
       posed_primitive = source.primitive;
     }
     for (std::size_t v = 0; v < mesh.positions.size(); ++v) {

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: MIT
+#include "player/command.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cstdio>
+#include <numbers>
+
+#include "player/source.hpp"
+
+namespace relit::player {
+
+int report(const Error& error) {
+  std::fprintf(stderr, "relit: %s\n", error.message.c_str());
+  switch (error.code) {
+    case ErrorCode::kInvalid:
+    case ErrorCode::kEnvironment:
+    case ErrorCode::kOutOfMemory:
+    case ErrorCode::kNotFound:
+      return kUsage;
+    default:
+      return kBadInput;
+  }
+}
+
+Result<ClipReader> open_clip(const std::string& source, const ClipOptions& options) {
+  RELIT_ASSIGN(auto bytes, open_source(source));
+  return ClipReader::open(std::move(bytes), source == "-" ? "standard input" : source, options);
+}
+
+int report_loss(const PlaybackLoss& loss) {
+  if (!loss.any()) return kSuccess;
+  std::fprintf(stderr, "relit: damaged: %llu frames show older light; first: %s\n",
+               static_cast<unsigned long long>(loss.frames), loss.first.c_str());
+  return kWithLosses;
+}
+
+void add_light_options(CLI::App& command, LightArguments& arguments) {
+  command
+      .add_option("--rotate-light", arguments.rotate_deg,
+                  "turn the light about +Y, degrees added to φ")
+      ->capture_default_str();
+  command.add_flag("--light-window", arguments.window, "window the bands against ringing");
+}
+
+Result<LoadedLight> load_light(const LightArguments& arguments, int order) {
+  LightOptions options;
+  options.order = order;
+  options.rotate_rad = arguments.rotate_deg * std::numbers::pi / 180;
+  options.window = arguments.window;
+  RELIT_ASSIGN(LoadedLight light, load_light(arguments.path, options));
+  for (const std::string& warning : light.warnings)
+    std::fprintf(stderr, "relit: warning: %s\n", warning.c_str());
+  const double least =
+      *std::min_element(light.minimum_radiance.begin(), light.minimum_radiance.end());
+  const double mean = light.light.sh.front()[1] * 0.28209479177387814;
+  if (least < -1e-6 * std::max(mean, 1e-30) && !arguments.window) {
+    std::fprintf(stderr,
+                 "relit: warning: %s: rings down to a radiance of %.3g (mean %.3g): an order-%d "
+                 "light cannot follow it; "
+                 "--light-window smooths it\n",
+                 arguments.path.c_str(), least, mean, light.light.order());
+  }
+  return light;
+}
+
+Result<FrameRange> parse_frames(const std::string& text, const char* option, std::uint64_t count) {
+  FrameRange range;
+  const char* end = text.data() + text.size();
+  auto [at, error] = std::from_chars(text.data(), end, range.first);
+  range.last = range.first;
+  if (error == std::errc() && at != end && *at == '-') {
+    const auto second = std::from_chars(at + 1, end, range.last);
+    at = second.ptr, error = second.ec;
+    range.single = false;
+  }
+  if (error != std::errc() || at != end || range.last < range.first) {
+    return fail(ErrorCode::kInvalid, std::string(option) + " " + text + ": the form is 7 or 0-99");
+  }
+  if (range.last >= count) {
+    return fail(ErrorCode::kNotFound, std::string(option) + " " + text + ": the clip has " +
+                                          std::to_string(count) + " frames, 0 to " +
+                                          std::to_string(count - 1));
+  }
+  return range;
+}
+
+}  // namespace relit::player

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "container/base/result.hpp"
+#include "player/clip_reader.hpp"
+#include "player/light.hpp"
+
+/// What the commands of `relit` share. Messages go to standard error, data and JSON to standard
+/// output.
+namespace relit::player {
+
+enum ExitStatus : int {
+  kSuccess = 0,
+  kBadInput = 1,    ///< the file, the light or the network
+  kUsage = 2,       ///< the command line or the machine
+  kWithLosses = 3,  ///< finished, but something was lost to damage
+};
+
+/// Prints the error and returns the exit status it means.
+int report(const Error& error);
+
+/// Opens a clip as the user named it.
+[[nodiscard]] Result<ClipReader> open_clip(const std::string& source, const ClipOptions& options);
+
+/// Says what was lost, if anything, and returns kSuccess or kWithLosses.
+int report_loss(const PlaybackLoss& loss);
+
+/// --light, --rotate-light and --light-window.
+struct LightArguments {
+  std::string path;
+  double rotate_deg = 0;
+  bool window = false;
+};
+void add_light_options(CLI::App& command, LightArguments& arguments);
+/// Loads the light and warns of negative radiance.
+[[nodiscard]] Result<LoadedLight> load_light(const LightArguments& arguments, int order);
+
+/// "7", "0-99": frames first..last of a clip of `count` frames.
+struct FrameRange {
+  std::uint64_t first = 0, last = 0;
+  bool single = true;
+};
+[[nodiscard]] Result<FrameRange> parse_frames(const std::string& text, const char* option,
+                                              std::uint64_t count);
+
+/// A subcommand: adds itself to the application; the function runs it after parsing.
+using Command = std::function<int()>;
+Command add_info(CLI::App& app);
+Command add_dump(CLI::App& app);
+Command add_light(CLI::App& app);
+Command add_render(CLI::App& app);
+
+}  // namespace relit::player
