@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: MIT
+#include "gles/environment.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace relit::gles {
+namespace {
+
+constexpr float kPi = std::numbers::pi_v<float>;
+
+struct Equirect {
+  int width = 0;
+  int height = 0;
+  std::vector<glm::vec3> texels;
+  [[nodiscard]] const glm::vec3& at(int x, int y) const {
+    return texels[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
+                  static_cast<std::size_t>(x)];
+  }
+  // Beyond a pole lies the row on its other side.
+  [[nodiscard]] const glm::vec3& across(int x, int y) const {
+    if (y < 0 || y >= height) {
+      y = y < 0 ? -1 - y : 2 * height - 1 - y;
+      x += width / 2;
+    }
+    return at((x % width + width) % width, std::clamp(y, 0, height - 1));
+  }
+};
+
+float clean(float value) { return std::isfinite(value) && value > 0 ? value : 0.0f; }
+
+// Means over the area of the smaller picture's pixels, so that small bright sources keep their
+// power.
+Equirect shrink(const EnvironmentView& source, int width, int height) {
+  Equirect out{width, height, {}};
+  out.texels.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  for (int y = 0; y < height; ++y) {
+    const int y0 = static_cast<int>(std::int64_t{y} * source.height / height);
+    const int y1 = std::max(y0 + 1, static_cast<int>(std::int64_t{y + 1} * source.height / height));
+    for (int x = 0; x < width; ++x) {
+      const int x0 = static_cast<int>(std::int64_t{x} * source.width / width);
+      const int x1 = std::max(x0 + 1, static_cast<int>(std::int64_t{x + 1} * source.width / width));
+      glm::vec3 sum(0.0f);
+      float weight = 0;
+      for (int j = y0; j < y1; ++j) {
+        const float row =
+            std::sin(kPi * (static_cast<float>(j) + 0.5f) / static_cast<float>(source.height));
+        for (int i = x0; i < x1; ++i) {
+          const float* p = source.rgb.data() + 3 * (static_cast<std::size_t>(j) *
+                                                        static_cast<std::size_t>(source.width) +
+                                                    static_cast<std::size_t>(i));
+          sum += row * glm::vec3(clean(p[0]), clean(p[1]), clean(p[2]));
+          weight += row;
+        }
+      }
+      out.texels[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
+                 static_cast<std::size_t>(x)] = sum / weight;
+    }
+  }
+  return out;
+}
+
+std::vector<float> gaussian(float sigma, int limit) {
+  const int radius = std::min(limit, static_cast<int>(std::ceil(3 * sigma)));
+  std::vector<float> kernel(static_cast<std::size_t>(2 * radius + 1));
+  float sum = 0;
+  for (int i = -radius; i <= radius; ++i) {
+    const float t = static_cast<float>(i) / std::max(sigma, 1e-6f);
+    sum += kernel[static_cast<std::size_t>(i + radius)] = std::exp(-0.5f * t * t);
+  }
+  for (float& k : kernel) k /= sum;
+  return kernel;
+}
+
+// Along the meridians, through the poles, then along the parallels, where an angle takes 1/sin θ as
+// many pixels. Not exactly a Gaussian on the sphere near the poles, but smooth there.
+void blur(Equirect& map, float sigma_rad) {
+  Equirect vertical = map;
+  const std::vector<float> kernel =
+      gaussian(sigma_rad / kPi * static_cast<float>(map.height), map.height - 1);
+  const int radius = static_cast<int>(kernel.size() / 2);
+  for (int y = 0; y < map.height; ++y) {
+    for (int x = 0; x < map.width; ++x) {
+      glm::vec3 sum(0.0f);
+      for (int i = -radius; i <= radius; ++i)
+        sum += kernel[static_cast<std::size_t>(i + radius)] * map.across(x, y + i);
+      vertical.texels[static_cast<std::size_t>(y * map.width + x)] = sum;
+    }
+  }
+  for (int y = 0; y < map.height; ++y) {
+    const float row =
+        std::sin(kPi * (static_cast<float>(y) + 0.5f) / static_cast<float>(map.height));
+    const std::vector<float> across =
+        gaussian(sigma_rad / row / (2 * kPi) * static_cast<float>(map.width), map.width / 2);
+    const int reach = static_cast<int>(across.size() / 2);
+    for (int x = 0; x < map.width; ++x) {
+      glm::vec3 sum(0.0f);
+      for (int i = -reach; i <= reach; ++i)
+        sum += across[static_cast<std::size_t>(i + reach)] * vertical.across(x + i, y);
+      map.texels[static_cast<std::size_t>(y * map.width + x)] = sum;
+    }
+  }
+}
+
+glm::vec3 lookup(const Equirect& map, const glm::vec3& direction) {
+  const float theta = std::acos(std::clamp(direction.y, -1.0f, 1.0f));
+  const float phi = std::atan2(direction.z, direction.x);
+  const float x = phi / (2 * kPi) * static_cast<float>(map.width) - 0.5f;
+  const float y = theta / kPi * static_cast<float>(map.height) - 0.5f;
+  const int x0 = static_cast<int>(std::floor(x));
+  const int y0 = static_cast<int>(std::floor(y));
+  const float fx = x - static_cast<float>(x0);
+  const float fy = y - static_cast<float>(y0);
+  return (1 - fy) * ((1 - fx) * map.across(x0, y0) + fx * map.across(x0 + 1, y0)) +
+         fy * ((1 - fx) * map.across(x0, y0 + 1) + fx * map.across(x0 + 1, y0 + 1));
+}
+
+template <class Radiance>
+CubeMap fill_cube(int side, const Radiance& radiance) {
+  CubeMap cube;
+  cube.side = side;
+  cube.rgb.reserve(18 * static_cast<std::size_t>(side) * static_cast<std::size_t>(side));
+  double sum = 0;
+  for (int face = 0; face < 6; ++face)
+    for (int y = 0; y < side; ++y)
+      for (int x = 0; x < side; ++x) {
+        const glm::vec3 value = radiance(cube_direction(face, x, y, side));
+        for (int c = 0; c < 3; ++c) {
+          cube.rgb.push_back(clean(value[c]));
+          sum += cube.rgb.back();
+        }
+      }
+  const double mean = sum / static_cast<double>(cube.rgb.size());
+  cube.scale = mean > 1e-30 ? static_cast<float>(mean) : 1.0f;
+  for (float& value : cube.rgb) value = std::min(value / cube.scale, 60000.0f);
+  return cube;
+}
+
+// Real spherical harmonics of bands 0 to 3 in the design's order.
+std::array<float, 16> basis(const glm::vec3& d) {
+  const float x = d.x, y = d.y, z = d.z;
+  return {0.28209479f,
+          0.48860251f * y,
+          0.48860251f * z,
+          0.48860251f * x,
+          1.09254843f * x * y,
+          1.09254843f * y * z,
+          0.31539157f * (3 * z * z - 1),
+          1.09254843f * x * z,
+          0.54627422f * (x * x - y * y),
+          0.59004359f * y * (3 * x * x - y * y),
+          2.89061144f * x * y * z,
+          0.45704580f * y * (5 * z * z - 1),
+          0.37317633f * z * (5 * z * z - 3),
+          0.45704580f * x * (5 * z * z - 1),
+          1.44530572f * z * (x * x - y * y),
+          0.59004359f * x * (x * x - 3 * y * y)};
+}
+
+}  // namespace
+
+glm::vec3 cube_direction(int face, int x, int y, int side) {
+  const float s = 2.0f * static_cast<float>(x) / static_cast<float>(side - 1) - 1.0f;
+  const float t = 2.0f * static_cast<float>(y) / static_cast<float>(side - 1) - 1.0f;
+  glm::vec3 d;
+  switch (face) {
+    case 0:
+      d = {1, -t, -s};
+      break;
+    case 1:
+      d = {-1, -t, s};
+      break;
+    case 2:
+      d = {s, 1, t};
+      break;
+    case 3:
+      d = {s, -1, -t};
+      break;
+    case 4:
+      d = {s, -t, 1};
+      break;
+    default:
+      d = {-s, -t, -1};
+      break;
+  }
+  return glm::normalize(d);
+}
+
+CubeMap make_cube_map(const EnvironmentView& environment, float blur_rad, int max_side) {
+  // A face spans a quarter of the width. Blurred pictures need only two texels a deviation.
+  int width = std::min(environment.width, 4 * max_side);
+  if (blur_rad > 0)
+    width = std::min(width, std::max(64, static_cast<int>(2 * (2 * kPi) / blur_rad)));
+  const int height =
+      std::clamp(static_cast<int>(std::int64_t{environment.height} * width / environment.width), 1,
+                 environment.height);
+  Equirect map = shrink(environment, width, height);
+  if (blur_rad > 0) blur(map, blur_rad);
+  const int side = std::clamp(width / 4, 2, max_side);
+  return fill_cube(side, [&](const glm::vec3& d) { return lookup(map, d); });
+}
+
+CubeMap make_cube_map(std::span<const std::array<float, 3>> sh, int side) {
+  return fill_cube(side, [&](const glm::vec3& d) {
+    const std::array<float, 16> y = basis(d);
+    glm::vec3 sum(0.0f);
+    for (std::size_t n = 0; n < std::min(sh.size(), y.size()); ++n)
+      sum += y[n] * glm::vec3(sh[n][0], sh[n][1], sh[n][2]);
+    return sum;
+  });
+}
+
+}  // namespace relit::gles

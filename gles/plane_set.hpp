@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+namespace relit::gles {
+
+/// Where a plane's samples lie in a decoded picture. Views with the same `picture` point into one
+/// component of one picture, in every frame at the same distances, so that what lies between them
+/// can be uploaded with them in one call and read in place. A number stands for one component: for
+/// layer l and component c, 3·l + c will do. Mantissas and exponents are numbered separately.
+struct PicturePlace {
+  int picture = -1;  ///< -1: unknown; the plane is uploaded by itself
+  int x = 0;         ///< of the view's first sample, in samples of that component
+  int y = 0;
+};
+
+/// What stays the same of a PlaneView from frame to frame.
+struct PlaneDescription {
+  int bit_depth = 8;       ///< 8 or 10: mantissa_zero is 128 or 512; 10 bits take two bytes
+  int mantissa_shift = 0;  ///< as PlaneView's
+  PicturePlace mantissa;
+  bool has_exponent = false;
+  int exponent_shift = 0;  ///< as PlaneView's
+  PicturePlace
+      exponent;  ///< planes that share exponents give the same place, and are fetched together
+};
+
+/// How a light map is kept on the GPU.
+enum class LightMapFormat {
+  kAuto,         ///< half floats where they can be rendered to and filtered, else square roots
+  kHalfFloat,    ///< RGBA16F
+  kFloat,        ///< RGBA32F, for measurements
+  kSquareRoot8,  ///< RGBA8: dithered square roots of values over a peak; negatives become 0
+};
+
+struct PlaneSetDescription {
+  int width = 0;  ///< of the light map, texels
+  int height = 0;
+  std::vector<PlaneDescription> planes;  ///< in the model's order
+  bool changes_every_frame =
+      true;  ///< double-buffers the planes, so that an upload waits for no draw
+  LightMapFormat format = LightMapFormat::kAuto;
+};
+
+}  // namespace relit::gles
