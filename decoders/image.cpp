@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: MIT
+#include "decoders/image.hpp"
+
+extern "C" {
+#include <libavcodec/avcodec.h>
+#include <libavutil/frame.h>
+#include <libavutil/imgutils.h>
+#include <libavutil/pixdesc.h>
+#include <libswscale/swscale.h>
+}
+
+#include <algorithm>
+#include <array>
+#include <climits>
+#include <cstring>
+#include <memory>
+#include <string>
+
+#include "container/base/limits.hpp"
+
+namespace relit::decoders {
+namespace {
+
+struct Signature {
+  std::size_t offset;
+  std::string_view bytes;
+  std::string_view media_type;
+};
+
+using namespace std::string_view_literals;
+constexpr std::array kSignatures{
+    Signature{0, "\x89PNG\r\n\x1a\n"sv, "image/png"},
+    Signature{0, "\xff\xd8\xff"sv, "image/jpeg"},
+    Signature{8, "WEBP"sv, "image/webp"},
+    Signature{0, "\xabKTX 20\xbb"sv, "image/ktx2"},
+    Signature{0, "GIF8"sv, "image/gif"},
+    Signature{0, "DDS "sv, "image/vnd-ms.dds"},
+    Signature{0, "BM"sv, "image/bmp"},
+};
+
+struct CodecContextDeleter {
+  void operator()(AVCodecContext* context) const { avcodec_free_context(&context); }
+};
+struct FrameDeleter {
+  void operator()(AVFrame* frame) const { av_frame_free(&frame); }
+};
+struct PacketDeleter {
+  void operator()(AVPacket* packet) const { av_packet_free(&packet); }
+};
+struct ScalerDeleter {
+  void operator()(SwsContext* scaler) const { sws_freeContext(scaler); }
+};
+using CodecContext = std::unique_ptr<AVCodecContext, CodecContextDeleter>;
+using Frame = std::unique_ptr<AVFrame, FrameDeleter>;
+using Packet = std::unique_ptr<AVPacket, PacketDeleter>;
+using Scaler = std::unique_ptr<SwsContext, ScalerDeleter>;
+
+struct Size {
+  std::int64_t width = 0;
+  std::int64_t height = 0;
+};
+
+std::uint32_t big_endian(std::span<const std::uint8_t> bytes, std::size_t count) {
+  std::uint32_t value = 0;
+  for (std::size_t i = 0; i < count; ++i) value = value << 8 | bytes[i];
+  return value;
+}
+
+Unexpected truncated(std::string_view media_type) {
+  return fail(ErrorCode::kTruncated, std::string(media_type) +
+                                         " picture ends before its last byte; export or "
+                                         "download it again");
+}
+
+// The chunks are walked here because libavcodec returns the rows it has when the rest is missing.
+Result<Size> check_png(std::span<const std::uint8_t> bytes) {
+  Size size;
+  std::size_t at = 8;
+  while (bytes.size() - at >= 12) {
+    const std::uint64_t length = big_endian(bytes.subspan(at), 4);
+    const std::string_view type(reinterpret_cast<const char*>(bytes.data()) + at + 4, 4);
+    if (length > bytes.size() - at - 12) break;
+    if (type == "IHDR" && length >= 8) {
+      size = {big_endian(bytes.subspan(at + 8), 4), big_endian(bytes.subspan(at + 12), 4)};
+    }
+    if (type == "IEND") return size;
+    at += static_cast<std::size_t>(length) + 12;
+  }
+  return truncated("image/png");
+}
+
+// Walks the markers up to the picture's end; entropy-coded data holds no marker but restarts.
+Result<Size> check_jpeg(std::span<const std::uint8_t> bytes) {
+  Size size;
+  std::size_t at = 2;
+  while (at + 1 < bytes.size()) {
+    if (bytes[at] != 0xff || bytes[at + 1] == 0xff || bytes[at + 1] == 0 ||
+        (bytes[at + 1] >= 0xd0 && bytes[at + 1] <= 0xd7) || bytes[at + 1] == 0x01) {
+      ++at;
+      continue;
+    }
+    const std::uint8_t marker = bytes[at + 1];
+    if (marker == 0xd9) return size;
+    if (bytes.size() - at < 4) break;
+    const std::size_t length = big_endian(bytes.subspan(at + 2), 2);
+    if (length < 2 || length > bytes.size() - at - 2) break;
+    const bool is_frame =
+        marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc;
+    if (is_frame && length >= 7) {
+      size = {big_endian(bytes.subspan(at + 7), 2), big_endian(bytes.subspan(at + 5), 2)};
+    }
+    at += 2 + length;
+  }
+  return truncated("image/jpeg");
+}
+
+Status check_size(const Size& size) {
+  const auto side = static_cast<std::int64_t>(limits::kImageSide);
+  const auto texels = static_cast<std::int64_t>(limits::kImageTexels);
+  if (size.width < 1 || size.height < 1) {
+    return fail(ErrorCode::kCorrupt, "the picture has no size; export it again");
+  }
+  if (size.width > side || size.height > side || size.width * size.height > texels) {
+    return fail(ErrorCode::kLimit, "the picture has " + std::to_string(size.width) + "×" +
+                                       std::to_string(size.height) + " texels; at most " +
+                                       std::to_string(side) + " a side and " +
+                                       std::to_string(texels) + " in all are taken: scale it down");
+  }
+  return {};
+}
+
+Result<Frame> decode_frame(std::span<const std::uint8_t> bytes, std::string_view media_type) {
+  const AVCodec* codec =
+      avcodec_find_decoder(media_type == "image/png" ? AV_CODEC_ID_PNG : AV_CODEC_ID_MJPEG);
+  if (codec == nullptr) {
+    return fail(ErrorCode::kEnvironment, "this libavcodec has no decoder for " +
+                                             std::string(media_type) + "; install one that has");
+  }
+  CodecContext context(avcodec_alloc_context3(codec));
+  Frame frame(av_frame_alloc());
+  Packet packet(av_packet_alloc());
+  if (!context || !frame || !packet ||
+      av_new_packet(packet.get(), static_cast<int>(bytes.size())) < 0) {
+    return fail(ErrorCode::kOutOfMemory, "no memory to decode a picture");
+  }
+  std::memcpy(packet->data, bytes.data(), bytes.size());
+  context->thread_count = 1;
+  context->max_pixels = static_cast<std::int64_t>(limits::kImageTexels);
+  context->err_recognition = AV_EF_CRCCHECK | AV_EF_EXPLODE;
+  context->idct_algo = FF_IDCT_SIMPLE;
+  context->flags |= AV_CODEC_FLAG_BITEXACT;
+  // What goes wrong is told by the returned Error, not by libavcodec's own log.
+  context->log_level_offset = 1 << 10;
+  int status = avcodec_open2(context.get(), codec, nullptr);
+  if (status >= 0) status = avcodec_send_packet(context.get(), packet.get());
+  if (status >= 0) status = avcodec_send_packet(context.get(), nullptr);
+  if (status >= 0) status = avcodec_receive_frame(context.get(), frame.get());
+  if (status == AVERROR(ENOMEM)) {
+    return fail(ErrorCode::kOutOfMemory, "no memory to decode a picture");
+  }
+  if (status < 0 || frame->decode_error_flags != 0 || (frame->flags & AV_FRAME_FLAG_CORRUPT) != 0) {
+    return fail(ErrorCode::kCorrupt, std::string(media_type) +
+                                         " picture does not decode; it is damaged: export or "
+                                         "download it again");
+  }
+  return frame;
+}
+
+Result<DecodedImage> to_rgba(const AVFrame& frame) {
+  const auto format = static_cast<AVPixelFormat>(frame.format);
+  DecodedImage image;
+  image.width = frame.width;
+  image.height = frame.height;
+  image.rgba.resize(static_cast<std::size_t>(frame.width) * static_cast<std::size_t>(frame.height) *
+                    4);
+  Scaler scaler(sws_getContext(
+      frame.width, frame.height, format, frame.width, frame.height, AV_PIX_FMT_RGBA,
+      SWS_BILINEAR | SWS_ACCURATE_RND | SWS_FULL_CHR_H_INP | SWS_FULL_CHR_H_INT | SWS_BITEXACT,
+      nullptr, nullptr, nullptr));
+  if (!scaler) {
+    return fail(ErrorCode::kUnsupported, "pictures of sample format " +
+                                             std::string(av_get_pix_fmt_name(format)) +
+                                             " cannot be converted; save it as 8-bit RGB");
+  }
+  // JFIF: full range, BT.601. Without this a scaler may take unspecified video for limited range.
+  const int* bt601 = sws_getCoefficients(SWS_CS_ITU601);
+  sws_setColorspaceDetails(scaler.get(), bt601, 1, bt601, 1, 0, 1 << 16, 1 << 16);
+  const std::array<std::uint8_t*, 1> out{image.rgba.data()};
+  const std::array<int, 1> stride{frame.width * 4};
+  if (sws_scale(scaler.get(), frame.data, frame.linesize, 0, frame.height, out.data(),
+                stride.data()) != frame.height) {
+    return fail(ErrorCode::kCorrupt, "the picture cannot be converted to RGBA; export it again");
+  }
+  return image;
+}
+
+}  // namespace
+
+std::string_view image_media_type(std::span<const std::uint8_t> bytes) {
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  for (const Signature& signature : kSignatures) {
+    if (text.size() >= signature.offset + signature.bytes.size() &&
+        text.substr(signature.offset, signature.bytes.size()) == signature.bytes) {
+      return signature.media_type;
+    }
+  }
+  return {};
+}
+
+Result<DecodedImage> decode_image(std::span<const std::uint8_t> bytes,
+                                  std::string_view media_type) {
+  const std::string_view type = image_media_type(bytes);
+  if (type != "image/png" && type != "image/jpeg") {
+    const std::string_view told = type.empty() ? media_type : type;
+    return fail(ErrorCode::kUnsupported, "the picture is neither PNG nor JPEG" +
+                                             (told.empty() ? "" : " but " + std::string(told)) +
+                                             "; convert it to one of them");
+  }
+  if (bytes.size() > INT_MAX - AV_INPUT_BUFFER_PADDING_SIZE) {
+    return fail(ErrorCode::kLimit, "the picture has 2 GiB or more; scale it down");
+  }
+  RELIT_ASSIGN(const Size size, type == "image/png" ? check_png(bytes) : check_jpeg(bytes));
+  RELIT_TRY(check_size(size));
+  RELIT_ASSIGN(const Frame frame, decode_frame(bytes, type));
+  RELIT_TRY(check_size({frame->width, frame->height}));
+  const AVPixFmtDescriptor* format = av_pix_fmt_desc_get(static_cast<AVPixelFormat>(frame->format));
+  if (format == nullptr || (type == "image/jpeg" && (format->nb_components > 3 ||
+                                                     (format->flags & AV_PIX_FMT_FLAG_ALPHA)))) {
+    return fail(ErrorCode::kUnsupported, "CMYK JPEG pictures are not supported; save it as RGB");
+  }
+  return to_rgba(*frame);
+}
+
+}  // namespace relit::decoders
