@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: MIT
+#include "media/lights.hpp"
+
+#include <cmath>
+
+#include "media/exact_math.hpp"
+
+namespace relit::media {
+namespace {
+
+constexpr int kWidth = 192, kHeight = 96;
+
+// A direction by its angle from +z towards +x and its height over the horizon, degrees.
+glm::dvec3 towards(double azimuth, double elevation) {
+  const double a = azimuth * kDegree, e = elevation * kDegree;
+  return {exact_cos(e) * exact_sin(a), exact_sin(e), exact_cos(e) * exact_cos(a)};
+}
+
+// A round glow: 1 in the middle, falling off as a Gaussian of the given width in degrees.
+double glow(const glm::dvec3& d, const glm::dvec3& centre, double degrees) {
+  const double spread = degrees * kDegree;
+  return exact_exp((glm::dot(d, centre) - 1.0) / (spread * spread));
+}
+
+// A soft-edged rectangle of light, seen in the plane that touches the sphere at its centre.
+double softbox(const glm::dvec3& d, double azimuth, double elevation, double half_width,
+               double half_height) {
+  const glm::dvec3 c = towards(azimuth, elevation);
+  const double facing = glm::dot(d, c);
+  if (facing <= 0.05) return 0.0;
+  const glm::dvec3 right = glm::normalize(glm::cross(glm::dvec3(0, 1, 0), c)),
+                   up = glm::cross(c, right);
+  const double x = glm::dot(d, right) / facing / half_width,
+               y = glm::dot(d, up) / facing / half_height;
+  return exact_exp(-(x * x * x * x + y * y * y * y));
+}
+
+glm::dvec3 mix(const glm::dvec3& a, const glm::dvec3& b, double t) { return a + t * (b - a); }
+
+// A large key from the front left, a weak fill, a cool rim behind, and a backdrop that sweeps into
+// the floor.
+glm::dvec3 studio_soft(const glm::dvec3& d) {
+  const double h = d.y;
+  const glm::dvec3 floor(0.36, 0.345, 0.33), horizon(0.50, 0.50, 0.51), top(0.105, 0.115, 0.14);
+  glm::dvec3 c = h < 0.0 ? mix(horizon, floor, smooth_step(0.0, -0.55, h))
+                         : mix(horizon, top, smooth_step(0.0, 0.85, h));
+  c *= 0.72 + 0.28 * glow(d, towards(200.0, 8.0), 55.0);
+  c += glm::dvec3(6.6, 6.1, 5.4) * softbox(d, -38.0, 40.0, 0.52, 0.42);
+  c += glm::dvec3(0.75, 0.85, 1.0) * softbox(d, 82.0, 18.0, 0.50, 0.60);
+  c += glm::dvec3(3.4, 3.9, 4.8) * softbox(d, 158.0, 34.0, 0.20, 0.62);
+  c += glm::dvec3(1.1, 1.05, 1.0) * glow(d, towards(0.0, 88.0), 30.0);
+  return c;
+}
+
+// A warm sun low over the horizon, its glow around it, and an evening sky.
+glm::dvec3 low_sun(const glm::dvec3& d) {
+  const glm::dvec3 sun = towards(-62.0, 19.0);
+  const double h = d.y, near = 0.5 + 0.5 * glm::dot(d, sun);
+  const glm::dvec3 zenith(0.085, 0.17, 0.36), middle(0.30, 0.36, 0.48);
+  const glm::dvec3 warm(1.25, 0.62, 0.26), cool(0.42, 0.36, 0.42);
+  const glm::dvec3 rim = mix(cool, warm, near * near);
+  glm::dvec3 sky =
+      mix(mix(rim, middle, smooth_step(-0.02, 0.42, h)), zenith, smooth_step(0.12, 0.95, h));
+  sky += glm::dvec3(5.2, 2.75, 1.05) * glow(d, sun, 21.0);
+  sky += glm::dvec3(34.0, 22.0, 11.5) * glow(d, sun, 6.5);
+  const glm::dvec3 ground =
+      mix(glm::dvec3(0.14, 0.105, 0.085), glm::dvec3(0.30, 0.19, 0.115), near) *
+      (1.0 - 0.35 * smooth_step(0.0, -0.9, h));
+  return mix(ground, sky, smooth_step(-0.07, 0.035, h));
+}
+
+// Teal on one side and orange running into magenta on the other, over a dim blue-grey room.
+glm::dvec3 coloured_pair(const glm::dvec3& d) {
+  const double h = d.y;
+  glm::dvec3 c = mix(glm::dvec3(0.060, 0.058, 0.072), glm::dvec3(0.030, 0.032, 0.050),
+                     smooth_step(-0.3, 0.9, h));
+  c = mix(c, glm::dvec3(0.075, 0.062, 0.066), smooth_step(0.05, -0.35, h));
+  c += glm::dvec3(0.22, 3.1, 3.5) * softbox(d, 78.0, 24.0, 0.58, 0.72);
+  c += glm::dvec3(0.03, 0.34, 0.40) * glow(d, towards(78.0, 18.0), 38.0);
+  c += glm::dvec3(5.6, 1.75, 0.30) * softbox(d, -82.0, 30.0, 0.50, 0.55);
+  c += glm::dvec3(2.1, 0.12, 0.95) * softbox(d, -128.0, 8.0, 0.55, 0.65);
+  c += glm::dvec3(0.50, 0.12, 0.10) * glow(d, towards(-95.0, 18.0), 40.0);
+  c += glm::dvec3(0.20, 0.19, 0.22) * glow(d, towards(0.0, 80.0), 35.0);
+  return c;
+}
+
+Panorama render(const char* name, glm::dvec3 (*radiance)(const glm::dvec3&)) {
+  Panorama out{.name = name, .width = kWidth, .height = kHeight, .pixels = {}};
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      const double theta = kPi * (y + 0.5) / kHeight, phi = kTau * (x + 0.5) / kWidth;
+      const double s = exact_sin(theta);
+      out.pixels.push_back(radiance({s * exact_cos(phi), exact_cos(theta), s * exact_sin(phi)}));
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+std::vector<Panorama> make_panoramas() {
+  return {render("studio_soft", studio_soft), render("low_sun", low_sun),
+          render("coloured_pair", coloured_pair)};
+}
+
+}  // namespace relit::media
