@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: MIT
+#include "player/character.hpp"
+
+#include <algorithm>
+
+#include "decoders/image.hpp"
+
+namespace relit::player {
+namespace {
+
+gles::Wrap to_gl(container::Wrap wrap) {
+  switch (wrap) {
+    case container::Wrap::kRepeat:
+      return gles::Wrap::kRepeat;
+    case container::Wrap::kClamp:
+      return gles::Wrap::kClamp;
+    case container::Wrap::kMirror:
+      return gles::Wrap::kMirror;
+  }
+  return gles::Wrap::kRepeat;
+}
+
+gles::AlphaMode to_gl(container::AlphaMode mode) {
+  switch (mode) {
+    case container::AlphaMode::kOpaque:
+      return gles::AlphaMode::kOpaque;
+    case container::AlphaMode::kMask:
+      return gles::AlphaMode::kMask;
+    case container::AlphaMode::kBlend:
+      return gles::AlphaMode::kBlend;
+  }
+  return gles::AlphaMode::kOpaque;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Character>> Character::create(const ClipReader& clip,
+                                                     const gles::Device& device) {
+  std::unique_ptr<Character> character(new Character(clip));
+  RELIT_ASSIGN(character->renderer_, gles::CharacterRenderer::create(device));
+  RELIT_TRY(character->set_materials());
+  RELIT_TRY(character->set_meshes());
+  return character;
+}
+
+Status Character::set_materials() {
+  const container::FileContents& contents = clip_.contents();
+  std::vector<decoders::DecodedImage> images;
+  std::vector<gles::ImageView> views;
+  std::vector<int> view_of_image;
+  for (const container::ImageRecord& record : contents.images) {
+    auto image = decoders::decode_image(record.bytes, record.media_type);
+    view_of_image.push_back(image ? static_cast<int>(images.size()) : -1);
+    if (image) {
+      images.push_back(std::move(*image));
+    } else {
+      warnings_.push_back("image " + std::to_string(record.id) + ": " + image.error().message);
+    }
+  }
+  for (const decoders::DecodedImage& image : images)
+    views.push_back({image.width, image.height, image.rgba});
+  std::vector<gles::MaterialView> materials;
+  for (const container::MaterialRecord& record : contents.materials) {
+    gles::MaterialView material;
+    material.base_color = record.base_color;
+    for (std::size_t i = 0; i < contents.images.size(); ++i) {
+      if (static_cast<std::int64_t>(contents.images[i].id) == record.image_id)
+        material.image = view_of_image[i];
+    }
+    material.wrap_u = to_gl(record.wrap_u), material.wrap_v = to_gl(record.wrap_v);
+    material.linear_filter = record.linear_filter;
+    material.alpha_mode = to_gl(record.alpha_mode);
+    material.alpha_cutoff = record.alpha_cutoff;
+    materials.push_back(material);
+  }
+  return renderer_->set_materials(views, materials);
+}
+
+Status Character::set_meshes() {
+  const std::vector<container::MaterialRecord>& materials = clip_.contents().materials;
+  std::vector<gles::MeshView> views;
+  std::size_t most = 0;
+  for (const decoders::Mesh& mesh : clip_.meshes()) {
+    gles::MeshView view;
+    view.vertex_count = mesh.positions.size();
+    view.lightmap_uv = mesh.lightmap_uv;
+    view.albedo_uv = mesh.albedo_uv;
+    view.colors = mesh.colors;
+    view.indices = mesh.indices;
+    const auto material =
+        std::find_if(materials.begin(), materials.end(),
+                     [&](const container::MaterialRecord& m) { return m.id == mesh.material_id; });
+    view.material = static_cast<std::uint32_t>(material - materials.begin());
+    views.push_back(view);
+    most = std::max(most, mesh.positions.size());
+  }
+  positions_.resize(most);
+  return renderer_->set_meshes(views);
+}
+
+Status Character::pose(const decoders::Pose& pose) {
+  for (std::size_t m = 0; m < clip_.meshes().size(); ++m) {
+    const decoders::Mesh& mesh = clip_.meshes()[m];
+    const std::span<glm::vec3> positions(positions_.data(), mesh.positions.size());
+    decoders::pose_mesh(mesh, m, pose, positions, {});
+    RELIT_TRY(renderer_->update_positions(m, positions));
+  }
+  return {};
+}
+
+}  // namespace relit::player

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "container/base/result.hpp"
+#include "gles/character_renderer.hpp"
+#include "player/clip_reader.hpp"
+
+namespace relit::player {
+
+/// The meshes and materials of a clip in GL: what a frame's pose and light map are drawn with.
+class Character {
+ public:
+  /// Decodes the albedo images and uploads everything that stays the same. `clip` and `device`
+  /// outlive this object. An image that does not decode is a warning, and its material goes
+  /// without. Errors: those of gles::CharacterRenderer.
+  static Result<std::unique_ptr<Character>> create(const ClipReader& clip,
+                                                   const gles::Device& device);
+
+  /// Poses the meshes. Steady state allocates nothing. Errors: kInvalid.
+  Status pose(const decoders::Pose& pose);
+
+  [[nodiscard]] gles::CharacterRenderer& renderer() { return *renderer_; }
+  [[nodiscard]] const std::vector<std::string>& warnings() const { return warnings_; }
+
+ private:
+  explicit Character(const ClipReader& clip) : clip_(clip) {}
+  Status set_materials();
+  Status set_meshes();
+
+  const ClipReader& clip_;
+  std::unique_ptr<gles::CharacterRenderer> renderer_;
+  std::vector<glm::vec3> positions_;
+  std::vector<std::string> warnings_;
+};
+
+}  // namespace relit::player
