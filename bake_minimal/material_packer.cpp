@@ -45,11 +45,11 @@ double blue_at(const Image& image, const TextureUse& use, double u, double v) {
       const int tx = wrapped(x0 + i, image.width, use.wrap_u);
       const int ty = wrapped(y0 + j, image.height, use.wrap_v);
       const double weight = (i != 0 ? fx : 1 - fx) * (j != 0 ? fy : 1 - fy);
-      sum += weight * image.rgba[(static_cast<std::size_t>(ty) *
-                                      static_cast<std::size_t>(image.width) +
-                                  static_cast<std::size_t>(tx)) *
-                                     4 +
-                                 2];
+      sum += weight *
+             image.rgba[(static_cast<std::size_t>(ty) * static_cast<std::size_t>(image.width) +
+                         static_cast<std::size_t>(tx)) *
+                            4 +
+                        2];
     }
   }
   return sum / 255;
@@ -129,7 +129,8 @@ class MaterialPacker {
     }
     const Image& i = scene_.images[image];
     if (i.width <= 0 || i.height <= 0 ||
-        i.rgba.size() != 4 * static_cast<std::size_t>(i.width) * static_cast<std::size_t>(i.height)) {
+        i.rgba.size() !=
+            4 * static_cast<std::size_t>(i.width) * static_cast<std::size_t>(i.height)) {
       return fail(ErrorCode::kInvalid, "image \"" + i.name + "\" has no texels");
     }
     return {};
@@ -185,9 +186,9 @@ class MaterialPacker {
       for (int x = 0; x < image.width; ++x) {
         const double keep =
             1 - metallic * blue_at(mask, metal, (x + 0.5) / image.width, (y + 0.5) / image.height);
-        std::uint8_t* p = &image.rgba[4 * (static_cast<std::size_t>(y) *
-                                               static_cast<std::size_t>(image.width) +
-                                           static_cast<std::size_t>(x))];
+        std::uint8_t* p =
+            &image.rgba[4 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) +
+                             static_cast<std::size_t>(x))];
         for (int c = 0; c < 3; ++c) {
           const double linear = srgb_to_linear(p[c] / 255.0) * keep;
           p[c] = static_cast<std::uint8_t>(

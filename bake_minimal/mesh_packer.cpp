@@ -66,7 +66,7 @@ class ScenePacker {
     }
     for (std::size_t i = 0; i < scene_.primitives.size(); ++i) {
       const Primitive& p = scene_.primitives[i];
-      if (p.node >= static_cast<int>(scene_.nodes.size())) {
+      if (p.node < 0 || p.node >= static_cast<int>(scene_.nodes.size())) {
         return fail(ErrorCode::kInvalid,
                     "primitive " + std::to_string(i) + ": its node does not exist");
       }
@@ -106,16 +106,40 @@ class ScenePacker {
   Status prepare() {
     for (std::size_t i = 0; i < scene_.primitives.size(); ++i) {
       const Primitive& p = scene_.primitives[i];
-      const auto node = static_cast<std::size_t>(std::max(p.node, 0));
-      const bool rigid = p.skin < 0;
-      const glm::mat4 world = rigid && p.node >= 0 ? world_[node] : glm::mat4(1.0f);
-      const bool still = rigid && (p.node < 0 || !moving_[node]);
-      const bool mirrored = glm::determinant(glm::dmat3(glm::dmat4(world))) < 0;
+      RELIT_TRY(check_primitive(scene_, static_cast<std::uint32_t>(i)));
+      const auto node = static_cast<std::size_t>(p.node);
+      const bool still = p.skin < 0 && !moving_[node];
       RELIT_ASSIGN(PreparedPrimitive prepared,
-                   prepare_primitive(scene_, static_cast<std::uint32_t>(i), still, mirrored, world));
+                   prepare_primitive(scene_, static_cast<std::uint32_t>(i), still, mirrored(p),
+                                     world_[node]));
       prepared_.push_back(std::move(prepared));
     }
     return {};
+  }
+
+  /// Whether the first pose turns the primitive inside out: by its node, or by most of its joints,
+  /// for the node of a skinned mesh does not count.
+  bool mirrored(const Primitive& p) const {
+    const auto determinant = [](const glm::mat4& m) {
+      return glm::determinant(glm::dmat3(glm::dmat4(m)));
+    };
+    if (p.skin < 0) return determinant(world_[static_cast<std::size_t>(p.node)]) < 0;
+    const Skin& skin = scene_.skins[static_cast<std::size_t>(p.skin)];
+    std::vector<double> sign;
+    for (std::size_t j = 0; j < skin.joints.size(); ++j) {
+      const double d = determinant(world_[static_cast<std::size_t>(skin.joints[j])]) *
+                       determinant(inverse_bind(skin, j));
+      sign.push_back(d < 0 ? -1 : d > 0 ? 1 : 0);
+    }
+    double sum = 0;
+    for (std::size_t i = 0; i < p.joints.size(); ++i) {
+      sum += static_cast<double>(p.weights[i]) * sign[p.joints[i]];
+    }
+    return sum < 0;
+  }
+
+  static glm::mat4 inverse_bind(const Skin& skin, std::size_t joint) {
+    return joint < skin.inverse_bind.size() ? skin.inverse_bind[joint] : glm::mat4(1.0f);
   }
 
   /// Nodes that pose a vertex and their ancestors, in the scene's order, and the palette.
@@ -181,8 +205,7 @@ class ScenePacker {
         continue;
       }
       const Skin& skin = scene_.skins[static_cast<std::size_t>(p.skin)];
-      const glm::mat4 bind = j < skin.inverse_bind.size() ? skin.inverse_bind[j] : glm::mat4(1.0f);
-      prepared.palette_index[j] = palette_entry(skin.joints[j], bind);
+      prepared.palette_index[j] = palette_entry(skin.joints[j], inverse_bind(skin, j));
     }
   }
 
@@ -239,13 +262,12 @@ class ScenePacker {
 
   Status pack(const PreparedPrimitive& prepared) {
     const Primitive& p = scene_.primitives[prepared.primitive];
-    const auto material = static_cast<std::size_t>(
-        out_.materials.packed_index[static_cast<std::size_t>(p.material)]);
+    const auto material =
+        static_cast<std::size_t>(out_.materials.packed_index[static_cast<std::size_t>(p.material)]);
     const TextureUse* texture = &out_.materials.texture[material];
     if (texture->image < 0) texture = nullptr;
-    if (texture != nullptr && (texture->texcoord < 0 || static_cast<std::size_t>(
-                                                            texture->texcoord) >=
-                                                            p.texcoords.size())) {
+    if (texture != nullptr && (texture->texcoord < 0 ||
+                               static_cast<std::size_t>(texture->texcoord) >= p.texcoords.size())) {
       return fail(ErrorCode::kInvalid, "primitive " + std::to_string(prepared.primitive) + " (\"" +
                                            p.name + "\"): its material needs UV set " +
                                            std::to_string(texture->texcoord) +

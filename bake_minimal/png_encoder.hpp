@@ -9,8 +9,9 @@
 
 namespace relit::bake {
 
-/// Encodes [height][width][4] bytes, straight alpha, as a PNG; without an alpha channel where all alphas
-/// are 255. Deterministic. Errors: kInvalid for sizes that do not fit, kEnvironment without an encoder.
+/// Encodes [height][width][4] bytes, straight alpha, as a PNG; without an alpha channel where all
+/// alphas are 255. Deterministic. Errors: kInvalid for sizes that do not fit, kEnvironment without
+/// an encoder.
 [[nodiscard]] Result<std::vector<std::uint8_t>> encode_png(int width, int height,
                                                            std::span<const std::uint8_t> rgba);
 

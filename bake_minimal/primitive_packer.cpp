@@ -34,61 +34,8 @@ bool all_finite(const std::vector<T>& vectors) {
   return true;
 }
 
-Status check_primitive(const Scene& scene, std::uint32_t index) {
-  const Primitive& p = scene.primitives[index];
-  const std::string where = place(p, index);
-  const std::size_t count = p.positions.size();
-  const auto influences = static_cast<std::size_t>(p.influences_per_vertex);
-  const auto sized = [&](std::size_t size) { return size == 0 || size == count; };
-  bool sizes = p.normals.size() == count && sized(p.colors.size()) &&
-               p.joints.size() == influences * count && p.weights.size() == influences * count;
-  bool finite = all_finite(p.positions) && all_finite(p.normals) && all_finite(p.colors) &&
-                all_finite(p.lightmap_uv) &&
-                std::all_of(p.weights.begin(), p.weights.end(),
-                            [](float w) { return std::isfinite(w); });
-  for (const auto& set : p.texcoords) {
-    sizes = sizes && set.size() == count;
-    finite = finite && all_finite(set);
-  }
-  for (const MorphDelta& m : p.morph_targets) {
-    sizes = sizes && m.positions.size() == count && sized(m.normals.size());
-    finite = finite && all_finite(m.positions) && all_finite(m.normals);
-  }
-  if (!sizes) return fail(ErrorCode::kInvalid, where + ": attributes differ in length");
-  if (!finite) return fail(ErrorCode::kInvalid, where + ": a vertex attribute is not finite");
-  if (p.lightmap_uv.size() != count) {
-    return fail(ErrorCode::kInvalid, where + ": has no light-map UVs; assign them first");
-  }
-  for (const glm::vec2& uv : p.lightmap_uv) {
-    if (uv.x < -1e-5f || uv.y < -1e-5f || uv.x > 1 + 1e-5f || uv.y > 1 + 1e-5f) {
-      return fail(ErrorCode::kInvalid, where + ": a light-map UV lies outside [0,1]");
-    }
-  }
-  if (p.indices.size() % 3 != 0 || std::any_of(p.indices.begin(), p.indices.end(),
-                                               [&](std::uint32_t i) { return i >= count; })) {
-    return fail(ErrorCode::kInvalid, where + ": an index is out of range, or no triangle list");
-  }
-  if (p.morph_targets.size() > limits::kMorphTargets) {
-    return fail(ErrorCode::kLimit, where + ": " + std::to_string(p.morph_targets.size()) +
-                                       " morph targets; at most " +
-                                       std::to_string(limits::kMorphTargets) + " can be stored");
-  }
-  if (p.skin >= 0) {
-    if (static_cast<std::size_t>(p.skin) >= scene.skins.size() || influences == 0) {
-      return fail(ErrorCode::kInvalid, where + ": its skin does not exist or it has no weights");
-    }
-    const std::size_t joints = scene.skins[static_cast<std::size_t>(p.skin)].joints.size();
-    if (std::any_of(p.joints.begin(), p.joints.end(),
-                    [&](std::uint16_t j) { return j >= joints; })) {
-      return fail(ErrorCode::kInvalid, where + ": a joint is not one of its skin's " +
-                                           std::to_string(joints));
-    }
-  }
-  return {};
-}
-
-/// Moves a still primitive into model space. Normal offsets are divided by what their normal is, so that
-/// normal + weight × offset keeps its direction.
+/// Moves a still primitive into model space. Normal offsets are divided by what their normal is, so
+/// that normal + weight × offset keeps its direction.
 void move_to_world(PreparedPrimitive& out, const glm::mat4& world) {
   const glm::dmat4 w(world);
   const glm::dmat3 linear(w);
@@ -104,7 +51,8 @@ void move_to_world(PreparedPrimitive& out, const glm::mat4& world) {
   for (MorphDelta& m : out.morphs) {
     for (glm::vec3& d : m.positions) d = glm::vec3(linear * glm::dvec3(d));
     for (std::size_t v = 0; v < m.normals.size(); ++v) {
-      if (lengths[v] > 0) m.normals[v] = glm::vec3(cofactor * glm::dvec3(m.normals[v]) / lengths[v]);
+      if (lengths[v] > 0)
+        m.normals[v] = glm::vec3(cofactor * glm::dvec3(m.normals[v]) / lengths[v]);
     }
   }
 }
@@ -193,8 +141,8 @@ class Quantizer {
     for (const glm::vec4& c : primitive_.colors) {
       for (int i = 0; i < 4; ++i) s.bytes.push_back(unorm8(c[i]));
     }
-    const bool white = std::all_of(s.bytes.begin(), s.bytes.end(),
-                                   [](std::uint8_t b) { return b == 255; });
+    const bool white =
+        std::all_of(s.bytes.begin(), s.bytes.end(), [](std::uint8_t b) { return b == 255; });
     if (!white) streams.push_back(std::move(s));
   }
 
@@ -350,9 +298,61 @@ void attach_normals(decoders::Mesh& mesh, const PreparedPrimitive& prepared,
 
 }  // namespace
 
+Status check_primitive(const Scene& scene, std::uint32_t index) {
+  const Primitive& p = scene.primitives[index];
+  const std::string where = place(p, index);
+  const std::size_t count = p.positions.size();
+  const auto influences = static_cast<std::size_t>(p.influences_per_vertex);
+  const auto sized = [&](std::size_t size) { return size == 0 || size == count; };
+  bool sizes = p.normals.size() == count && sized(p.colors.size()) &&
+               p.joints.size() == influences * count && p.weights.size() == influences * count;
+  bool finite =
+      all_finite(p.positions) && all_finite(p.normals) && all_finite(p.colors) &&
+      all_finite(p.lightmap_uv) &&
+      std::all_of(p.weights.begin(), p.weights.end(), [](float w) { return std::isfinite(w); });
+  for (const auto& set : p.texcoords) {
+    sizes = sizes && set.size() == count;
+    finite = finite && all_finite(set);
+  }
+  for (const MorphDelta& m : p.morph_targets) {
+    sizes = sizes && m.positions.size() == count && sized(m.normals.size());
+    finite = finite && all_finite(m.positions) && all_finite(m.normals);
+  }
+  if (!sizes) return fail(ErrorCode::kInvalid, where + ": attributes differ in length");
+  if (!finite) return fail(ErrorCode::kInvalid, where + ": a vertex attribute is not finite");
+  if (p.lightmap_uv.size() != count) {
+    return fail(ErrorCode::kInvalid, where + ": has no light-map UVs; assign them first");
+  }
+  for (const glm::vec2& uv : p.lightmap_uv) {
+    if (uv.x < -1e-5f || uv.y < -1e-5f || uv.x > 1 + 1e-5f || uv.y > 1 + 1e-5f) {
+      return fail(ErrorCode::kInvalid, where + ": a light-map UV lies outside [0,1]");
+    }
+  }
+  if (p.indices.size() % 3 != 0 || std::any_of(p.indices.begin(), p.indices.end(),
+                                               [&](std::uint32_t i) { return i >= count; })) {
+    return fail(ErrorCode::kInvalid, where + ": an index is out of range, or no triangle list");
+  }
+  if (p.morph_targets.size() > limits::kMorphTargets) {
+    return fail(ErrorCode::kLimit, where + ": " + std::to_string(p.morph_targets.size()) +
+                                       " morph targets; at most " +
+                                       std::to_string(limits::kMorphTargets) + " can be stored");
+  }
+  if (p.skin >= 0) {
+    if (static_cast<std::size_t>(p.skin) >= scene.skins.size() || influences == 0) {
+      return fail(ErrorCode::kInvalid, where + ": its skin does not exist or it has no weights");
+    }
+    const std::size_t joints = scene.skins[static_cast<std::size_t>(p.skin)].joints.size();
+    if (std::any_of(p.joints.begin(), p.joints.end(),
+                    [&](std::uint16_t j) { return j >= joints; })) {
+      return fail(ErrorCode::kInvalid,
+                  where + ": a joint is not one of its skin's " + std::to_string(joints));
+    }
+  }
+  return {};
+}
+
 Result<PreparedPrimitive> prepare_primitive(const Scene& scene, std::uint32_t primitive, bool still,
                                             bool mirrored, const glm::mat4& world) {
-  RELIT_TRY(check_primitive(scene, primitive));
   const Primitive& p = scene.primitives[primitive];
   PreparedPrimitive out;
   out.primitive = primitive;
@@ -362,8 +362,8 @@ Result<PreparedPrimitive> prepare_primitive(const Scene& scene, std::uint32_t pr
   out.morphs = p.morph_targets;
   out.indices = p.indices;
   if (mirrored) {
-    // The cofactor matrix of a reflection turns normals round, as the reflection does the winding: with
-    // both turned here, posing needs no exceptions.
+    // The cofactor matrix of a reflection turns normals round, as the reflection does the winding:
+    // with both turned here, posing needs no exceptions.
     for (std::size_t i = 0; i + 2 < out.indices.size(); i += 3) {
       std::swap(out.indices[i + 1], out.indices[i + 2]);
     }
@@ -394,8 +394,8 @@ Result<std::vector<PackedPart>> pack_primitive(const Scene& scene,
     PackedPart packed;
     packed.record = make_record(q, part, p.first_morph_weight);
     // Decoded like any file's: what the checks of the decoder refuse must not be written.
-    RELIT_ASSIGN(packed.mesh, decoders::decode_mesh(packed.record, limits::kPalette,
-                                                    scene.morph_weight_count));
+    RELIT_ASSIGN(packed.mesh,
+                 decoders::decode_mesh(packed.record, limits::kPalette, scene.morph_weight_count));
     attach_normals(packed.mesh, prepared, part.vertices);
     packed.source_vertex = std::move(part.vertices);
     for (const std::uint32_t t : part.triangles) {

@@ -22,8 +22,9 @@ struct PreparedPrimitive {
   std::vector<glm::vec3> positions;
   std::vector<glm::vec3> normals;
   std::vector<MorphDelta> morphs;
-  std::vector<std::uint32_t> indices;         ///< counter-clockwise from the front
-  std::vector<std::uint16_t> palette_index;   ///< by the skin's joints; one entry for a rigid primitive
+  std::vector<std::uint32_t> indices;  ///< counter-clockwise from the front
+  std::vector<std::uint16_t>
+      palette_index;  ///< by the skin's joints; one entry for a rigid primitive
 };
 
 /// How the attributes are rounded; shared by all primitives of one space.
@@ -32,9 +33,12 @@ struct PrimitiveGrids {
   std::vector<float> morph_steps;  ///< by morph target
 };
 
-/// Checks a primitive (sizes, indices, finite numbers) and brings it into its mesh's space: moved by
-/// `world` where it is `still`, wound the other way with turned normals where `mirrored`.
-/// Errors: kInvalid.
+/// Sizes, indices, joints and finite numbers of a primitive. Errors: kInvalid, kLimit.
+[[nodiscard]] Status check_primitive(const Scene& scene, std::uint32_t primitive);
+
+/// Brings a checked primitive into its mesh's space: moved by `world` where it is `still`, wound
+/// the other way with turned normals where `mirrored`. Errors: kInvalid when that leads to
+/// infinity.
 [[nodiscard]] Result<PreparedPrimitive> prepare_primitive(const Scene& scene,
                                                           std::uint32_t primitive, bool still,
                                                           bool mirrored, const glm::mat4& world);
@@ -47,10 +51,13 @@ struct PackedPart {
   std::vector<std::uint32_t> source_triangle;
 };
 
-/// Quantises, merges, orders, splits and encodes one primitive. `texture` is the material's, null when it
-/// has no image. Record ids, material and names are the caller's to set. Errors: kInvalid, kLimit.
-[[nodiscard]] Result<std::vector<PackedPart>> pack_primitive(
-    const Scene& scene, const PreparedPrimitive& prepared, const PrimitiveGrids& grids,
-    const TextureUse* texture, const PackOptions& options);
+/// Quantises, merges, orders, splits and encodes one primitive. `texture` is the material's, null
+/// when it has no image. Record ids, material and names are the caller's to set. Errors: kInvalid,
+/// kLimit.
+[[nodiscard]] Result<std::vector<PackedPart>> pack_primitive(const Scene& scene,
+                                                             const PreparedPrimitive& prepared,
+                                                             const PrimitiveGrids& grids,
+                                                             const TextureUse* texture,
+                                                             const PackOptions& options);
 
 }  // namespace relit::bake

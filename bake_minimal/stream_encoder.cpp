@@ -23,8 +23,7 @@ void fix_formats() {
 
 std::vector<std::uint8_t> deflate(std::span<const std::uint8_t> bytes, int level) {
   std::vector<std::uint8_t> out(ZSTD_compressBound(bytes.size()));
-  const std::size_t size =
-      ZSTD_compress(out.data(), out.size(), bytes.data(), bytes.size(), level);
+  const std::size_t size = ZSTD_compress(out.data(), out.size(), bytes.data(), bytes.size(), level);
   // Only a failed allocation gets here: the output is large enough for anything.
   if (ZSTD_isError(size)) throw std::bad_alloc();
   out.resize(size);
@@ -36,8 +35,7 @@ std::vector<std::uint8_t> encode_vertex_stream(std::span<const std::uint8_t> byt
   fix_formats();
   const std::size_t count = bytes.size() / stride;
   std::vector<std::uint8_t> coded(meshopt_encodeVertexBufferBound(count, stride));
-  coded.resize(
-      meshopt_encodeVertexBuffer(coded.data(), coded.size(), bytes.data(), count, stride));
+  coded.resize(meshopt_encodeVertexBuffer(coded.data(), coded.size(), bytes.data(), count, stride));
   return deflate(coded);
 }
 

@@ -55,10 +55,8 @@ std::vector<MeshPart> order_triangles(std::span<const std::uint32_t> indices,
   for (std::size_t t = 0; t < match.size(); ++t) {
     // The matched triangle's own corners: the optimiser may have rotated them.
     const std::uint32_t* corners = &indices[3 * std::size_t{match[t]}];
-    const auto unseen =
-        static_cast<std::size_t>(std::count_if(corners, corners + 3, [&](std::uint32_t v) {
-          return local[v] == kUnseen;
-        }));
+    const auto unseen = static_cast<std::size_t>(
+        std::count_if(corners, corners + 3, [&](std::uint32_t v) { return local[v] == kUnseen; }));
     if (parts.back().vertices.size() + unseen > max_vertices ||
         parts.back().triangles.size() == max_triangles) {
       for (const std::uint32_t v : parts.back().vertices) local[v] = kUnseen;

@@ -12,9 +12,9 @@ std::uint16_t Grid::nearest(float value, std::size_t axis) const {
 }
 
 Grid uniform_grid(const glm::vec3& low, const glm::vec3& high, int bits) {
-  const double extent = std::max({static_cast<double>(high.x) - low.x,
-                                  static_cast<double>(high.y) - low.y,
-                                  static_cast<double>(high.z) - low.z});
+  const double extent =
+      std::max({static_cast<double>(high.x) - low.x, static_cast<double>(high.y) - low.y,
+                static_cast<double>(high.z) - low.z});
   float step = static_cast<float>(extent / ((1 << bits) - 1));
   // A subnormal step would lose its digits.
   if (!(step >= 1e-30f)) step = 1;
@@ -53,9 +53,9 @@ std::vector<Influence> quantize_weights(std::span<const Influence> influences) {
     left -= s.whole;
   }
   for (; left > 0; --left) {
-    Share& next = *std::max_element(shares.begin(), shares.end(), [](const Share& a, const Share& b) {
-      return a.remainder < b.remainder;
-    });
+    Share& next =
+        *std::max_element(shares.begin(), shares.end(),
+                          [](const Share& a, const Share& b) { return a.remainder < b.remainder; });
     ++next.whole;
     next.remainder -= 1;
   }

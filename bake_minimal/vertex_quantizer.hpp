@@ -17,8 +17,8 @@ struct Grid {
   [[nodiscard]] std::uint16_t nearest(float value, std::size_t axis) const;
 };
 
-/// A grid over [low, high] whose step is the same on every axis: the longest axis takes 2^bits − 1 of
-/// them. A box without extent gets a step of 1. `bits`: 1..16.
+/// A grid over [low, high] whose step is the same on every axis: the longest axis takes 2^bits − 1
+/// of them. A box without extent gets a step of 1. `bits`: 1..16.
 [[nodiscard]] Grid uniform_grid(const glm::vec3& low, const glm::vec3& high, int bits);
 
 /// A palette index and how much it counts.
@@ -27,9 +27,10 @@ struct Influence {
   float weight = 0;
 };
 
-/// Rounds the influences of a vertex to 8 bits so that they sum to exactly 255: equal joints are added
-/// up, then the largest remainders take what rounding down left over (the earlier joint where they tie).
-/// Returns those that count, heaviest first. Without any positive weight the first joint takes all.
+/// Rounds the influences of a vertex to 8 bits so that they sum to exactly 255: equal joints are
+/// added up, then the largest remainders take what rounding down left over (the earlier joint where
+/// they tie). Returns those that count, heaviest first. Without any positive weight the first joint
+/// takes all.
 [[nodiscard]] std::vector<Influence> quantize_weights(std::span<const Influence> influences);
 
 /// The octahedral map of a unit vector, 8 bits a component, as decode_mesh inverts it.

@@ -77,9 +77,8 @@ std::size_t channel_values(ChannelTarget target) {
 bool channel_in_bounds(const PoseChannel& channel) {
   const bool rotation = channel.target == ChannelTarget::kRotation;
   const float top = rotation ? static_cast<float>(kRotationMask) : 65535.0f;
-  const float bound = rotation                                        ? 2.0f
-                      : channel.target == ChannelTarget::kMorphWeight ? kMaxMorphWeight
-                                                                      : kMaxCoordinate;
+  const float bound =
+      channel.target == ChannelTarget::kMorphWeight ? kMaxMorphWeight : kMaxCoordinate;
   for (std::size_t i = 0; i < channel_values(channel.target); ++i) {
     const float high = channel.offset[i] + channel.step[i] * top;
     if (!(std::abs(channel.offset[i]) <= bound) || !(std::abs(high) <= bound)) return false;
