@@ -14,18 +14,6 @@ namespace {
 
 constexpr std::int64_t kHalf = FixedTriangle::kOne / 2;
 constexpr std::uint32_t kNobody = std::numeric_limits<std::uint32_t>::max();
-// Coordinates beyond this many atlas sizes are refused: with sides up to 2^14 texels, edge products
-// then stay below 2 · (2^(14+3+1+12))^2 = 2^61.
-constexpr float kFarthest = 8.0f;
-
-std::int64_t floor_div(std::int64_t a, std::int64_t b) {
-  const std::int64_t q = a / b;
-  return q - ((a % b != 0) && ((a < 0) != (b < 0)) ? 1 : 0);
-}
-
-std::int64_t cross(glm::i64vec2 a, glm::i64vec2 b, glm::i64vec2 p) {
-  return (b.x - a.x) * (p.y - a.y) - (b.y - a.y) * (p.x - a.x);
-}
 
 struct Nearest {
   double distance2;
