@@ -55,6 +55,8 @@ int order_of(RecordType type) {
 }
 
 std::uint32_t crc32(std::span<const std::uint8_t> bytes) {
+  // av_crc steps back from the end of the data, which a null pointer does not survive.
+  if (bytes.empty()) return 0;
   static const AVCRC* const table = av_crc_get_table(AV_CRC_32_IEEE_LE);
   return ~av_crc(table, 0xFFFFFFFFu, bytes.data(), bytes.size());
 }

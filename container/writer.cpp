@@ -50,7 +50,7 @@ Status Writer::add(const LayerRecord& record) { return add_static(types::kLayer,
 
 Status Writer::add_ancillary(RecordType type, std::span<const std::uint8_t> payload) {
   const auto write = [&]() -> Status {
-    RELIT_TRY(enter(order_));
+    if (closed_) return enter(order_);
     RELIT_TRY(require(is_well_formed(type) && !is_critical(type),
                       "'" + type_name(type) + "' is not the type of an ancillary record"));
     return write_record(type, payload);

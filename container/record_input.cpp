@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: MIT
+#include "container/record_input.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <string>
+#include <utility>
+
+namespace relit::container {
+namespace {
+
+/// A header's length is believed only as far as bytes really come.
+constexpr std::size_t kFirstReadBytes = std::size_t{1} << 20;
+/// Below this, reading on is cheaper than seeking: over HTTP a seek is a new connection.
+constexpr std::uint64_t kLeastSeekBytes = std::uint64_t{1} << 16;
+constexpr std::size_t kScanBytes = std::size_t{1} << 16;
+constexpr std::size_t kCandidateBytes = kRecordHeaderBytes + kSegmentMarker.size();
+/// A payload buffer beyond this is given back after use.
+constexpr std::size_t kKeptBytes = std::size_t{1} << 24;
+
+Error truncated(std::uint64_t wanted, std::uint64_t got) {
+  return {ErrorCode::kTruncated,
+          "the data end after " + std::to_string(got) + " of " + std::to_string(wanted) + " bytes"};
+}
+
+}  // namespace
+
+Result<std::size_t> RecordInput::read_source(std::span<std::uint8_t> out) {
+  auto got = source_->read(out);
+  if (got) source_offset_ += *got;
+  return got;
+}
+
+/// Reads until `out` is full or the source ends.
+Result<std::size_t> RecordInput::read_fully(std::span<std::uint8_t> out) {
+  std::size_t done = std::min(out.size(), replay_.size() - replay_at_);
+  if (done > 0) {
+    std::memcpy(out.data(), replay_.data() + replay_at_, done);
+    replay_at_ += done;
+    if (replay_at_ == replay_.size()) {
+      replay_ = {};
+      replay_at_ = 0;
+    }
+  }
+  while (done < out.size()) {
+    RELIT_ASSIGN(const std::size_t got, read_source(out.subspan(done)));
+    if (got == 0) break;
+    done += got;
+  }
+  return done;
+}
+
+Status RecordInput::read_raw(std::span<std::uint8_t> out) {
+  RELIT_ASSIGN(const std::size_t got, read_fully(out));
+  if (got < out.size()) return Unexpected{truncated(out.size(), got)};
+  return {};
+}
+
+Unexpected RecordInput::lose(Error error) {
+  lost_ = error;
+  return Unexpected{std::move(error)};
+}
+
+void RecordInput::drop_suspect() {
+  dropped_bytes_ += suspect_.size();
+  suspect_.clear();
+}
+
+Status RecordInput::perform_skip() {
+  const std::size_t replayed =
+      static_cast<std::size_t>(std::min<std::uint64_t>(pending_skip_, replay_.size() - replay_at_));
+  replay_at_ += replayed;
+  std::uint64_t left = std::exchange(pending_skip_, 0) - replayed;
+  if (left >= kLeastSeekBytes && source_->seekable()) {
+    // Beyond the end a seek would succeed, and hide that the data are incomplete.
+    const auto size = source_->size();
+    if (size && *size - std::min(*size, source_offset_) < left)
+      return lose(truncated(left, *size - std::min(*size, source_offset_)));
+    if (auto status = source_->seek(source_offset_ + left); !status)
+      return lose(std::move(status).error());
+    source_offset_ += left;
+    return {};
+  }
+  std::vector<std::uint8_t> scratch(
+      static_cast<std::size_t>(std::min<std::uint64_t>(left, kScanBytes)));
+  while (left > 0) {
+    const auto step = static_cast<std::size_t>(std::min<std::uint64_t>(left, scratch.size()));
+    auto got = read_source(std::span(scratch).first(step));
+    if (!got) return lose(std::move(got).error());
+    if (*got == 0) return lose(truncated(left, 0));
+    left -= *got;
+  }
+  return {};
+}
+
+Result<std::optional<RecordHeader>> RecordInput::peek() {
+  if (lost_) return Unexpected{*lost_};
+  if (header_) return header_;
+  if (pending_skip_ > 0) {
+    drop_suspect();
+    RELIT_TRY(perform_skip());
+  }
+  auto got = read_fully(header_bytes_);
+  if (!got) {
+    drop_suspect();
+    return lose(std::move(got).error());
+  }
+  if (*got == 0) return std::optional<RecordHeader>();
+  auto header = *got < kRecordHeaderBytes ? Result<RecordHeader>(Unexpected{truncated(24, *got)})
+                                          : decode_header(header_bytes_, verify_);
+  if (!header) {
+    suspect_.insert(suspect_.end(), header_bytes_.begin(),
+                    header_bytes_.begin() + static_cast<std::ptrdiff_t>(*got));
+    return lose(std::move(header).error());
+  }
+  drop_suspect();
+  header_ = *header;
+  return header_;
+}
+
+Result<std::span<const std::uint8_t>> RecordInput::payload() {
+  const RecordHeader header = *header_;
+  header_.reset();
+  const auto size = static_cast<std::size_t>(header.payload_bytes);
+  const std::size_t total = size + padding_after(size);
+  if (payload_.capacity() > kKeptBytes) payload_ = {};
+  payload_.clear();
+
+  const auto suspect = [&] {
+    suspect_.assign(header_bytes_.begin(), header_bytes_.end());
+    suspect_.insert(suspect_.end(), payload_.begin(), payload_.end());
+  };
+  while (payload_.size() < total) {
+    const std::size_t done = payload_.size();
+    payload_.resize(std::min(total, std::max(kFirstReadBytes, 2 * done)));
+    auto got = read_fully(std::span(payload_).subspan(done));
+    // How much arrived before the source failed is unknown, so there is nothing to search later.
+    if (!got) return lose(std::move(got).error());
+    if (done + *got == payload_.size()) continue;
+    payload_.resize(done + *got);
+    suspect();
+    return lose(truncated(total, payload_.size()));
+  }
+  const auto bytes = std::span<const std::uint8_t>(payload_);
+  const bool padded = std::ranges::all_of(bytes.subspan(size), [](auto b) { return b == 0; });
+  if (verify_ && (!padded || crc32(bytes.first(size)) != header.payload_crc)) {
+    suspect();
+    return fail(ErrorCode::kCorrupt,
+                padded ? "the payload does not match its checksum" : "the padding is not zero");
+  }
+  return bytes.first(size);
+}
+
+void RecordInput::skip() {
+  const std::uint64_t size = header_->payload_bytes;
+  header_.reset();
+  skip_bytes(size + padding_after(size));
+}
+
+std::uint64_t RecordInput::offset_bytes() const {
+  const std::uint64_t next = source_offset_ - (replay_.size() - replay_at_) + pending_skip_;
+  return header_ ? next - kRecordHeaderBytes : next;
+}
+
+Status RecordInput::seek(std::uint64_t offset_bytes) {
+  RELIT_TRY(source_->seek(offset_bytes));
+  source_offset_ = offset_bytes;
+  replay_ = {};
+  replay_at_ = 0;
+  pending_skip_ = 0;
+  header_.reset();
+  drop_suspect();
+  lost_.reset();
+  return {};
+}
+
+/// Appends some of the source to replay_; false at the end.
+Result<bool> RecordInput::grow_window() {
+  const std::size_t before = replay_.size();
+  replay_.resize(before + kScanBytes);
+  auto got = read_source(std::span(replay_).subspan(before));
+  replay_.resize(before + (got ? *got : 0));
+  if (!got) return Unexpected{std::move(got).error()};
+  return *got > 0;
+}
+
+Result<bool> RecordInput::resync() {
+  if (!header_ && !lost_ && pending_skip_ > 0) RELIT_TRY(perform_skip());
+  pending_skip_ = 0;
+  if (header_) suspect_.assign(header_bytes_.begin(), header_bytes_.end());
+  const bool inclusive = header_.has_value() || suspect_.empty();
+  header_.reset();
+  suspect_.insert(suspect_.end(), replay_.begin() + static_cast<std::ptrdiff_t>(replay_at_),
+                  replay_.end());
+  replay_ = std::exchange(suspect_, {});
+  // Records start at multiples of 8 in the file; after a lossy source the window may start
+  // elsewhere.
+  const std::uint64_t window_offset = source_offset_ - replay_.size();
+  replay_at_ = (kRecordAlignment - window_offset % kRecordAlignment) % kRecordAlignment;
+  if (!inclusive && replay_at_ == 0) replay_at_ = kRecordAlignment;
+
+  for (;; replay_at_ += kRecordAlignment) {
+    while (replay_.size() < replay_at_ + kCandidateBytes) {
+      if (replay_at_ > kScanBytes) {
+        dropped_bytes_ += replay_at_;
+        replay_.erase(replay_.begin(), replay_.begin() + static_cast<std::ptrdiff_t>(replay_at_));
+        replay_at_ = 0;
+      }
+      auto more = grow_window();
+      if (!more) return lose(std::move(more).error());
+      if (*more) continue;
+      dropped_bytes_ += replay_.size();
+      replay_ = {};
+      replay_at_ = 0;
+      lost_.reset();
+      return false;
+    }
+    const auto* candidate = replay_.data() + replay_at_;
+    if (std::memcmp(candidate + kRecordHeaderBytes, kSegmentMarker.data(), kSegmentMarker.size()))
+      continue;
+    const auto header =
+        decode_header(std::span<const std::uint8_t, kRecordHeaderBytes>(candidate, 24), verify_);
+    if (header && header->type == types::kSegment && (header->flags & flags::kCriticalMask) == 0)
+      break;
+  }
+  dropped_bytes_ += replay_at_;
+  lost_.reset();
+  return true;
+}
+
+}  // namespace relit::container
