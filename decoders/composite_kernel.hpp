@@ -78,24 +78,43 @@ struct Tile {
   int x = 0, y = 0, width = 0, height = 0;
 };
 
-/// What a plane adds to a row of a tile.
-struct RowJob {
-  const std::uint8_t* mantissas = nullptr;  ///< the row's first
-  const float* steps = nullptr;             ///< one for each texel, or null
+/// What a plane adds to a tile. All pointers are to the tile's first column; `row` moves them.
+struct PlaneJob {
+  const std::uint8_t* mantissas = nullptr;  ///< row 0 of the picture
+  std::ptrdiff_t mantissa_stride = 0;
+  const float* steps = nullptr;  ///< one for each texel of the tile, or null
   int zero = 0;
   float weight[3] = {};  ///< the plane's scale included
   int channel = 0;       ///< when there is only one
-  float* out[3] = {};
-  const float* normals = nullptr;
+  float* out[3] = {};    ///< the tile's first row
+  std::ptrdiff_t out_stride = 0;
+  const float* normals = nullptr;          ///< the tile's first row
   const float (*prediction)[3] = nullptr;  ///< [9][rgb]
 };
 
+/// One row of a PlaneJob.
+struct Row {
+  const std::uint8_t* mantissas;
+  const float* steps;
+  float* out[3];
+  const float* normals;
+};
+
+template <int kShift>
+RELIT_KERNEL inline Row row_of(const PlaneJob& job, const Tile& tile, int i) {
+  const std::ptrdiff_t at = i * job.out_stride;
+  return {job.mantissas + ((tile.y + i) >> kShift) * job.mantissa_stride,
+          job.steps == nullptr ? nullptr : job.steps + static_cast<std::ptrdiff_t>(i) * tile.width,
+          {job.out[0] + at, job.out[1] + at, job.out[2] + at},
+          job.normals == nullptr ? nullptr : job.normals + 3 * at};
+}
+
 template <class V, class Sample, int kShift, bool kStepped>
-RELIT_KERNEL inline typename V::F value_at(const RowJob& row, int x) {
+RELIT_KERNEL inline typename V::F value_at(const Row& row, typename V::I zero, int x) {
   const std::uint8_t* samples =
       row.mantissas + (x >> kShift) * static_cast<std::ptrdiff_t>(sizeof(Sample));
   const auto mantissa = V::template load_samples<kShift>(samples, Sample{});
-  const auto value = V::to_float(V::sub_int(mantissa, V::set_int(row.zero)));
+  const auto value = V::to_float(V::sub_int(mantissa, zero));
   if constexpr (kStepped) return V::mul(value, V::load(row.steps + x));
   return value;
 }
@@ -103,16 +122,16 @@ RELIT_KERNEL inline typename V::F value_at(const RowJob& row, int x) {
 /// out[c] += weight[c] · value, for one channel or all, from texel `x` of the row while a whole
 /// vector is left. Returns the first texel not done.
 template <class V, class Sample, int kShift, bool kStepped, bool kOneChannel>
-RELIT_KERNEL int accumulate(const RowJob& row, int x, int width) {
-  const auto weight0 = V::set(row.weight[kOneChannel ? row.channel : 0]);
-  const auto weight1 = V::set(row.weight[1]);
-  const auto weight2 = V::set(row.weight[2]);
-  float* const out0 = row.out[kOneChannel ? row.channel : 0];
+RELIT_KERNEL inline int accumulate(const PlaneJob& job, const Row& row, int x, int width) {
+  const auto zero = V::set_int(job.zero);
+  const auto weight0 = V::set(job.weight[kOneChannel ? job.channel : 0]);
+  const auto weight1 = V::set(job.weight[1]);
+  const auto weight2 = V::set(job.weight[2]);
+  float* const out0 = row.out[kOneChannel ? job.channel : 0];
   float* const out1 = row.out[1];
   float* const out2 = row.out[2];
-  const RowJob local = row;  // `out` cannot alias a copy, so the loop keeps it in registers
   for (; x + V::kLanes <= width; x += V::kLanes) {
-    const auto value = value_at<V, Sample, kShift, kStepped>(local, x);
+    const auto value = value_at<V, Sample, kShift, kStepped>(row, zero, x);
     V::store(out0 + x, V::add(V::load(out0 + x), V::mul(weight0, value)));
     if constexpr (!kOneChannel) {
       V::store(out1 + x, V::add(V::load(out1 + x), V::mul(weight1, value)));
@@ -124,12 +143,12 @@ RELIT_KERNEL int accumulate(const RowJob& row, int x, int width) {
 
 /// out[c] += value · E_c(N), E's polynomial being `prediction`, with the plane's scale in it.
 template <class V, class Sample, int kShift, bool kStepped>
-RELIT_KERNEL int predict(const RowJob& row, int x, int width) {
+RELIT_KERNEL inline int predict(const PlaneJob& job, const Row& row, int x, int width) {
   using F = typename V::F;
-  const RowJob local = row;
+  const auto zero = V::set_int(job.zero);
   for (; x + V::kLanes <= width; x += V::kLanes) {
     F nx, ny, nz;
-    V::load_vectors(local.normals + 3 * static_cast<std::ptrdiff_t>(x), nx, ny, nz);
+    V::load_vectors(row.normals + 3 * static_cast<std::ptrdiff_t>(x), nx, ny, nz);
     const F zz3 = V::mul(V::mul(nz, nz), V::set(3));
     const F polynomial[9] = {V::set(1),
                              ny,
@@ -140,46 +159,59 @@ RELIT_KERNEL int predict(const RowJob& row, int x, int width) {
                              V::sub(zz3, V::set(1)),
                              V::mul(nx, nz),
                              V::sub(V::mul(nx, nx), V::mul(ny, ny))};
-    const F value = value_at<V, Sample, kShift, kStepped>(local, x);
+    const F value = value_at<V, Sample, kShift, kStepped>(row, zero, x);
     for (int c = 0; c < 3; ++c) {
-      F sum = V::set(local.prediction[0][c]);
+      F sum = V::set(job.prediction[0][c]);
       for (int n = 1; n < 9; ++n) {
-        sum = V::add(sum, V::mul(V::set(local.prediction[n][c]), polynomial[n]));
+        sum = V::add(sum, V::mul(V::set(job.prediction[n][c]), polynomial[n]));
       }
-      float* const out = local.out[c] + x;
+      float* const out = row.out[c] + x;
       V::store(out, V::add(V::load(out), V::mul(value, sum)));
     }
   }
   return x;
 }
 
-enum class RowOperation { kAccumulateOne, kAccumulateAll, kPredict };
+enum class Operation { kAccumulateOne, kAccumulateAll, kPredict };
 
 template <class V, class Sample, int kShift, bool kStepped>
-RELIT_KERNEL void run_row(const RowJob& row, RowOperation operation, int width) {
-  int x = 0;
-  switch (operation) {
-    case RowOperation::kAccumulateOne:
-      x = accumulate<V, Sample, kShift, kStepped, true>(row, x, width);
-      accumulate<Scalar, Sample, kShift, kStepped, true>(row, x, width);
-      break;
-    case RowOperation::kAccumulateAll:
-      x = accumulate<V, Sample, kShift, kStepped, false>(row, x, width);
-      accumulate<Scalar, Sample, kShift, kStepped, false>(row, x, width);
-      break;
-    case RowOperation::kPredict:
-      x = predict<V, Sample, kShift, kStepped>(row, x, width);
-      predict<Scalar, Sample, kShift, kStepped>(row, x, width);
-      break;
+RELIT_KERNEL void run_rows(const PlaneJob& job, Operation operation, const Tile& tile) {
+  for (int i = 0; i < tile.height; ++i) {
+    const Row row = row_of<kShift>(job, tile, i);
+    int x = 0;
+    switch (operation) {
+      case Operation::kAccumulateOne:
+        x = accumulate<V, Sample, kShift, kStepped, true>(job, row, x, tile.width);
+        accumulate<Scalar, Sample, kShift, kStepped, true>(job, row, x, tile.width);
+        break;
+      case Operation::kAccumulateAll:
+        x = accumulate<V, Sample, kShift, kStepped, false>(job, row, x, tile.width);
+        accumulate<Scalar, Sample, kShift, kStepped, false>(job, row, x, tile.width);
+        break;
+      case Operation::kPredict:
+        x = predict<V, Sample, kShift, kStepped>(job, row, x, tile.width);
+        predict<Scalar, Sample, kShift, kStepped>(job, row, x, tile.width);
+        break;
+    }
   }
 }
 
-using RowFunction = void (*)(const RowJob&, RowOperation, int);
+template <class V, class Sample, int kShift>
+RELIT_KERNEL void run_sampled(const PlaneJob& job, Operation operation, const Tile& tile) {
+  if (job.steps != nullptr) return run_rows<V, Sample, kShift, true>(job, operation, tile);
+  run_rows<V, Sample, kShift, false>(job, operation, tile);
+}
 
-template <class V, class Sample>
-RELIT_KERNEL RowFunction row_function(int shift, bool stepped) {
-  if (shift == 0) return stepped ? run_row<V, Sample, 0, true> : run_row<V, Sample, 0, false>;
-  return stepped ? run_row<V, Sample, 1, true> : run_row<V, Sample, 1, false>;
+template <class V>
+RELIT_KERNEL void run_plane(const PlaneView& plane, const PlaneJob& job, Operation operation,
+                            const Tile& tile) {
+  const bool half = plane.mantissa_shift != 0;
+  if (plane.mantissa.bytes_per_sample == 1) {
+    if (half) return run_sampled<V, std::uint8_t, 1>(job, operation, tile);
+    return run_sampled<V, std::uint8_t, 0>(job, operation, tile);
+  }
+  if (half) return run_sampled<V, std::uint16_t, 1>(job, operation, tile);
+  run_sampled<V, std::uint16_t, 0>(job, operation, tile);
 }
 
 template <class V, int kShift>
@@ -237,32 +269,6 @@ RELIT_KERNEL inline bool same_steps(const PlaneView& a, const PlaneView& b) {
          a.exponent_shift == b.exponent_shift && a.exponent_zero == b.exponent_zero;
 }
 
-/// Points `row` at row y of the tile, all but steps and weights.
-RELIT_KERNEL inline void aim(const CompositeJob& job, const PlaneView& plane, const Tile& tile,
-                             int y, RowJob& row) {
-  const int shift = plane.mantissa_shift;
-  row.mantissas = plane.mantissa.data + (y >> shift) * plane.mantissa.stride_bytes +
-                  static_cast<std::ptrdiff_t>(tile.x >> shift) * plane.mantissa.bytes_per_sample;
-  const std::ptrdiff_t texel = static_cast<std::ptrdiff_t>(y) * job.width + tile.x;
-  const std::ptrdiff_t area = static_cast<std::ptrdiff_t>(job.width) * job.height;
-  for (int c = 0; c < 3; ++c) row.out[c] = job.out.data() + c * area + texel;
-  if (row.prediction != nullptr) row.normals = &job.normals.data()[texel].x;
-}
-
-template <class V>
-RELIT_KERNEL void run_plane(const CompositeJob& job, const PlaneView& plane, const Tile& tile,
-                            const float* steps, RowJob& row, RowOperation operation) {
-  const bool stepped = steps != nullptr;
-  const RowFunction function = plane.mantissa.bytes_per_sample == 1
-                                   ? row_function<V, std::uint8_t>(plane.mantissa_shift, stepped)
-                                   : row_function<V, std::uint16_t>(plane.mantissa_shift, stepped);
-  for (int i = 0; i < tile.height; ++i) {
-    aim(job, plane, tile, tile.y + i, row);
-    row.steps = stepped ? steps + static_cast<std::ptrdiff_t>(i) * tile.width : nullptr;
-    function(row, operation, tile.width);
-  }
-}
-
 /// The factors of E(N)'s polynomial, with the plane's scale.
 RELIT_KERNEL inline void fold_prediction(const FoldedLight& light, float scale,
                                          float (&factors)[9][3]) {
@@ -307,6 +313,30 @@ RELIT_KERNEL void saturate(const CompositeJob& job, const Tile& tile) {
   }
 }
 
+/// Everything of the plane's job but the steps. Returns how many channels have a weight.
+RELIT_KERNEL inline int aim(const CompositeJob& job, std::size_t k, const Tile& tile,
+                            PlaneJob& out) {
+  const PlaneView& plane = job.planes[k];
+  out.mantissas =
+      plane.mantissa.data +
+      static_cast<std::ptrdiff_t>(tile.x >> plane.mantissa_shift) * plane.mantissa.bytes_per_sample;
+  out.mantissa_stride = plane.mantissa.stride_bytes;
+  out.zero = plane.mantissa_zero;
+  out.out_stride = job.width;
+  const std::ptrdiff_t texel = static_cast<std::ptrdiff_t>(tile.y) * job.width + tile.x;
+  int used = 0;
+  for (int c = 0; c < 3; ++c) {
+    out.out[c] = job.out.data() + static_cast<std::ptrdiff_t>(c) * job.width * job.height + texel;
+    out.weight[c] =
+        static_cast<float>(static_cast<double>(job.light.weights[k][static_cast<std::size_t>(c)]) *
+                           static_cast<double>(plane.scale));
+    if (out.weight[c] == 0) continue;
+    ++used;
+    out.channel = c;
+  }
+  return used;
+}
+
 template <class V>
 RELIT_KERNEL void run_tile(const CompositeJob& job, const Tile& tile) {
   alignas(32) float steps[Tile::kTexels];
@@ -315,33 +345,25 @@ RELIT_KERNEL void run_tile(const CompositeJob& job, const Tile& tile) {
   for (std::size_t k = 0; k < job.planes.size(); ++k) {
     const PlaneView& plane = job.planes[k];
     const bool predicts = static_cast<int>(k) == job.light.prediction_plane;
-    RowJob row;
-    int used = 0;
-    for (int c = 0; c < 3; ++c) {
-      row.weight[c] = static_cast<float>(
-          static_cast<double>(job.light.weights[k][static_cast<std::size_t>(c)]) *
-          static_cast<double>(plane.scale));
-      if (row.weight[c] == 0) continue;
-      ++used;
-      row.channel = c;
-    }
+    PlaneJob add;
+    const int used = aim(job, k, tile, add);
     if (plane.mantissa.empty() || (used == 0 && !predicts)) continue;
-    row.zero = plane.mantissa_zero;
-    const bool has_steps = !plane.exponent.empty();
-    if (has_steps && (stepped == nullptr || !same_steps(*stepped, plane))) {
-      tile_steps<V>(plane, tile, steps);
+    if (!plane.exponent.empty()) {
+      if (stepped == nullptr || !same_steps(*stepped, plane)) tile_steps<V>(plane, tile, steps);
       stepped = &plane;
+      add.steps = steps;
     }
-    const float* const plane_steps = has_steps ? steps : nullptr;
-    if (used > 0) {
-      run_plane<V>(job, plane, tile, plane_steps, row,
-                   used == 1 ? RowOperation::kAccumulateOne : RowOperation::kAccumulateAll);
-    }
+    if (used == 1) run_plane<V>(plane, add, Operation::kAccumulateOne, tile);
+    if (used > 1) run_plane<V>(plane, add, Operation::kAccumulateAll, tile);
     if (predicts) {
       float factors[9][3];
       fold_prediction(job.light, plane.scale, factors);
-      row.prediction = factors;
-      run_plane<V>(job, plane, tile, plane_steps, row, RowOperation::kPredict);
+      add.prediction = factors;
+      add.normals =
+          &job.normals[static_cast<std::size_t>(tile.y) * static_cast<std::size_t>(job.width) +
+                       static_cast<std::size_t>(tile.x)]
+               .x;
+      run_plane<V>(plane, add, Operation::kPredict, tile);
     }
   }
   saturate<V>(job, tile);
