@@ -46,9 +46,8 @@ Status check_numbers(const CodingOptions& o, const CodecTraits& codec) {
   if (o.codec == "h264" && *o.bit_depth == 8 && *o.crf < 0) {
     return invalid("--crf below 0 needs --bit-depth 10");
   }
-  if (o.exponent_block != 0 &&
-      (o.exponent_block < 1 || o.exponent_block > 32 ||
-       !std::has_single_bit(static_cast<unsigned>(o.exponent_block)))) {
+  if (o.exponent_block != 0 && (o.exponent_block < 1 || o.exponent_block > 32 ||
+                                !std::has_single_bit(static_cast<unsigned>(o.exponent_block)))) {
     return invalid("--exponent-block is 1, 2, 4, 8, 16, 32, or 0 for none, not " +
                    std::to_string(o.exponent_block));
   }

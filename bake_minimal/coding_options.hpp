@@ -15,23 +15,24 @@ enum class Layout : std::uint8_t {
   kGrid,     ///< one layer, tile n at row ⌊n/(N+1)⌋, column n mod (N+1), as in Xu et al.
 };
 
-/// How the transfer is quantised and coded (design, section 4). What is left open takes the best value
-/// for the rest, see resolve().
+/// How the transfer is quantised and coded (design, section 4). What is left open takes the best
+/// value for the rest, see resolve().
 struct CodingOptions {
   /// FFmpeg's name of the mantissas' codec: "h264", "mpeg4", "ffv1", "hevc", "vp9" or "av1".
   std::string codec = "h264";
 
   /// Quality, in the units of x264's constant rate factor: lower is better, +6 doubles the step and
-  /// about halves the bytes. -12..51 with h264 (below 0 only with 10 bits), 0..51 with hevc and mpeg4,
-  /// 0..63 with vp9 and av1. MPEG-4's quantiser is the one of the same step, qscale = 2^((crf-10)/6),
-  /// rounded to 1..31. Default: 18; 13 for mpeg4.
+  /// about halves the bytes. -12..51 with h264 (below 0 only with 10 bits), 0..51 with hevc and
+  /// mpeg4, 0..63 with vp9 and av1. MPEG-4's quantiser is the one of the same step, qscale =
+  /// 2^((crf-10)/6), rounded to 1..31. Default: 18; 13 for mpeg4.
   std::optional<double> crf;
 
   /// Mantissas are coded without loss; what remains is the quantiser's error, quantiser_bound().
   /// Always so with ffv1. Needs 4:4:4 (planes are G, B, R) or luma.
   bool lossless = false;
 
-  std::optional<int> bit_depth;  ///< of mantissas, 8 or 10. Default: 10; 8 for mpeg4 and with exponents
+  std::optional<int>
+      bit_depth;  ///< of mantissas, 8 or 10. Default: 10; 8 for mpeg4 and with exponents
 
   /// 4:2:0 and 4:4:4 hold Y, Co, Cg (lossless: G, B, R); luma holds (R+G+B)/3 alone.
   /// Default: 4:2:0; lossless 4:4:4.
@@ -40,14 +41,15 @@ struct CodingOptions {
   /// Side of the square of texels that shares one exponent: 1, 2, 4, 8, 16 or 32. 0: no exponents,
   /// every coefficient has one scale for the whole clip.
   int exponent_block = 0;
-  /// Frames that share one exponent picture, from the segment's first frame on; 0: the whole segment.
+  /// Frames that share one exponent picture, from the segment's first frame on; 0: the whole
+  /// segment.
   int exponent_hold = 0;
 
   Layout layout = Layout::kLayered;
   int segment_frames = 25;  ///< frames a segment, each a closed group of pictures
 
-  /// The encoder's own preset ("medium", "veryslow", …; cpu-used for vp9 and av1). Empty: veryslow for
-  /// h264, slow for hevc.
+  /// The encoder's own preset ("medium", "veryslow", …; cpu-used for vp9 and av1). Empty: veryslow
+  /// for h264, slow for hevc.
   std::string preset;
   /// Pictures that a decoder has to keep, at most (h264, hevc). More costs the player memory.
   int reference_frames = 4;
@@ -55,8 +57,8 @@ struct CodingOptions {
   /// Without exponents: the same quantisation step for all bands, instead of steps in inverse
   /// proportion to the light that falls on the band (kLightRms).
   bool uniform_steps = false;
-  /// Without exponents: the middle of each coefficient's range becomes the model's mean μ, so that the
-  /// mantissas use their whole range.
+  /// Without exponents: the middle of each coefficient's range becomes the model's mean μ, so that
+  /// the mantissas use their whole range.
   bool centred = true;
 
   /// Layers encoded at once. The bytes do not depend on it.
@@ -67,8 +69,8 @@ struct CodingOptions {
 /// (media/lights/standard_lights.json), per coefficient and channel.
 inline constexpr double kLightRms[4] = {3.5643, 1.5277, 1.2291, 0.6041};
 
-/// Xu et al., section 4: the order-N grid, mantissas of 8 bits through MPEG-4's 4:2:0, one exponent for
-/// every texel of every frame, through FFV1.
+/// Xu et al., section 4: the order-N grid, mantissas of 8 bits through MPEG-4's 4:2:0, one exponent
+/// for every texel of every frame, through FFV1.
 [[nodiscard]] CodingOptions paper_options();
 
 /// Fills in what is open and checks the combination. Errors: kInvalid, saying what would be right.

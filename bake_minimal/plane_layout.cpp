@@ -19,6 +19,10 @@ using container::Rect;
 /// Textures of the smallest machines end here.
 constexpr int kRowSamples = 2048;
 
+/// FFmpeg 5.1 does not give smaller FFV1 pictures back (2x1, 1x4) and breaks its heap with them;
+/// the decoder refuses them.
+constexpr int kLeastFfv1Side = 16;
+
 struct Tiling {
   int columns = 1;
   int rows = 1;
@@ -80,16 +84,18 @@ Result<LayerPlan> plan_layer(std::vector<int> coefficients, int order, int width
   if (record.has_exponents) {
     record.exponent_codec = "ffv1";
     record.exponent_block = static_cast<std::uint8_t>(g);
-    record.exponent_width = static_cast<std::uint16_t>(tiling.columns * blocks_x);
-    record.exponent_height = static_cast<std::uint16_t>(tiling.rows * blocks_y);
+    record.exponent_width =
+        static_cast<std::uint16_t>(std::max(tiling.columns * blocks_x, kLeastFfv1Side));
+    record.exponent_height =
+        static_cast<std::uint16_t>(std::max(tiling.rows * blocks_y, kLeastFfv1Side));
   }
   const Basis basis = basis_of(o);
   for (std::size_t i = 0; i < coefficients.size(); ++i) {
     for (int c = 0; c < component_count(basis); ++c) {
       PlaneRecord plane;
       plane.component = static_cast<std::uint8_t>(c);
-      plane.mantissa_rect = tile_rect(static_cast<int>(i), tiling, padded(width), padded(height),
-                                      width, height);
+      plane.mantissa_rect =
+          tile_rect(static_cast<int>(i), tiling, padded(width), padded(height), width, height);
       if (record.has_exponents) {
         plane.exponent_rect =
             tile_rect(static_cast<int>(i), tiling, blocks_x, blocks_y, blocks_x, blocks_y);
@@ -148,9 +154,8 @@ Result<std::vector<LayerPlan>> plan_layers(int order, int width, int height,
                                          " texels a side, not " + std::to_string(width) + "x" +
                                          std::to_string(height));
   }
-  std::vector<std::vector<int>> groups(resolved.layout == Layout::kGrid
-                                           ? 1u
-                                           : static_cast<std::size_t>(order) + 1);
+  std::vector<std::vector<int>> groups(
+      resolved.layout == Layout::kGrid ? 1u : static_cast<std::size_t>(order) + 1);
   for (int n = 0; n < decoders::coefficient_count(order); ++n) {
     const int group = resolved.layout == Layout::kGrid ? 0 : decoders::band_of(n);
     groups[static_cast<std::size_t>(group)].push_back(n);

@@ -22,8 +22,8 @@ enum class Basis : std::uint8_t { kYCoCg, kGbr, kLuma };
 [[nodiscard]] int component_count(Basis basis);
 
 /// Y = (R+2G+B)/4, Co = (R−B)/2, Cg = (2G−R−B)/4; G, B, R; or (R+G+B)/3, which is the least squares
-/// best where all channels count alike, as they do under white light. Exact inverse of the columns of
-/// M where there is one: R = Y+Co−Cg, G = Y+Cg, B = Y−Co−Cg.
+/// best where all channels count alike, as they do under white light. Exact inverse of the columns
+/// of M where there is one: R = Y+Co−Cg, G = Y+Cg, B = Y−Co−Cg.
 [[nodiscard]] std::array<double, 3> to_components(Basis basis, const std::array<double, 3>& rgb);
 [[nodiscard]] std::array<double, 3> to_rgb(Basis basis, const std::array<double, 3>& components);
 
@@ -39,9 +39,9 @@ struct LayoutIds {
   std::uint32_t first_track_id = 0;  ///< a layer takes one, or two with exponents, in order
 };
 
-/// Lays the planes of an order-N model out: tiles of the light map's size, padded to multiples of 16,
-/// in rows (as long as 2048 samples allow) by band, or as the grid. Deterministic.
-/// Errors: kLimit when a picture would be too large, kInvalid for a bad order or size.
+/// Lays the planes of an order-N model out: tiles of the light map's size, padded to multiples of
+/// 16, in rows (as long as 2048 samples allow) by band, or as the grid. Deterministic. Errors:
+/// kLimit when a picture would be too large, kInvalid for a bad order or size.
 [[nodiscard]] Result<std::vector<LayerPlan>> plan_layers(int order, int width, int height,
                                                          const CodingOptions& resolved,
                                                          const LayoutIds& ids);
@@ -54,10 +54,10 @@ struct LayoutIds {
 [[nodiscard]] constexpr int exponent_least(int bit_depth) { return bit_depth == 8 ? 9 : 11; }
 
 /// Largest error that quantisation can cause in T[coefficient, channel] where the planes are coded
-/// without loss at full resolution: Σ_k |M[n,c,k]| · scale_k · 2^(E−E₀) / 2. `exponent` is the block's
-/// E; ignored without exponents. With E = 0 the bound is 0. Not counted: the rounding of the sum to
-/// float, and what a luma-only model drops.
-[[nodiscard]] double quantiser_bound(std::span<const container::LayerRecord> layers, int coefficient,
-                                     int channel, int exponent = 0);
+/// without loss at full resolution: Σ_k |M[n,c,k]| · scale_k · 2^(E−E₀) / 2. `exponent` is the
+/// block's E; ignored without exponents. With E = 0 the bound is 0. Not counted: the rounding of
+/// the sum to float, and what a luma-only model drops.
+[[nodiscard]] double quantiser_bound(std::span<const container::LayerRecord> layers,
+                                     int coefficient, int channel, int exponent = 0);
 
 }  // namespace relit::bake

@@ -78,8 +78,8 @@ SampleView crop(const VideoFrame& picture, int component, const Rect& rect, int 
 }
 
 /// The samples of GBR pictures' planes follow the bitstream's order, so no component is permuted.
-PlaneView view_plane(const LayerRecord& layer, const PlaneRecord& plane, const VideoFrame& mantissas,
-                     const VideoFrame* exponents) {
+PlaneView view_plane(const LayerRecord& layer, const PlaneRecord& plane,
+                     const VideoFrame& mantissas, const VideoFrame* exponents) {
   PlaneView view;
   view.mantissa_shift = layer.chroma == Chroma::k420 && plane.component > 0 ? 1 : 0;
   view.mantissa = crop(mantissas, plane.component, plane.mantissa_rect, view.mantissa_shift);
@@ -106,9 +106,9 @@ Status check_layer(const ModelRecord& model, const LayerRecord& layer) {
     return fail(ErrorCode::kLimit, where + ": too many planes");
   }
   if (layer.bit_depth != 8 && layer.bit_depth != 10) {
-    return fail(ErrorCode::kUnsupported, where + ": mantissas of " +
-                                             std::to_string(layer.bit_depth) +
-                                             " bits, known are 8 and 10");
+    return fail(
+        ErrorCode::kUnsupported,
+        where + ": mantissas of " + std::to_string(layer.bit_depth) + " bits, known are 8 and 10");
   }
   if (layer.has_exponents &&
       (!std::has_single_bit(unsigned{layer.exponent_block}) || layer.exponent_block > 32)) {
@@ -171,8 +171,7 @@ Status LayerDecoder::add_chunk(const container::SegmentRecord& segment,
 
 Status LayerDecoder::decode(std::uint64_t frame, std::size_t first, std::size_t slot,
                             FrameView& out) {
-  const std::span<PlaneView> planes =
-      std::span(out.planes_).subspan(first, layer_.planes.size());
+  const std::span<PlaneView> planes = std::span(out.planes_).subspan(first, layer_.planes.size());
   std::fill(planes.begin(), planes.end(), PlaneView{});
   VideoFrame& mantissas = out.pictures_[2 * slot];
   VideoFrame& exponents = out.pictures_[2 * slot + 1];
@@ -202,8 +201,8 @@ Result<PlaneDecoder> PlaneDecoder::open(const ModelRecord& model,
                                         std::span<const LayerRecord> layers,
                                         const PlaneDecoderOptions& options) {
   if (!options.wanted.empty() && options.wanted.size() != layers.size()) {
-    return fail(ErrorCode::kInvalid, "one choice for each of the " +
-                                         std::to_string(layers.size()) + " layers is needed, got " +
+    return fail(ErrorCode::kInvalid, "one choice for each of the " + std::to_string(layers.size()) +
+                                         " layers is needed, got " +
                                          std::to_string(options.wanted.size()));
   }
   PlaneDecoder decoder;
@@ -313,7 +312,8 @@ Status reconstruct(std::span<const PlaneView> planes, const ModelRecord& model,
       }
     }
   }
-  std::transform(sum.begin(), sum.end(), out.begin(), [](double v) { return static_cast<float>(v); });
+  std::transform(sum.begin(), sum.end(), out.begin(),
+                 [](double v) { return static_cast<float>(v); });
   return {};
 }
 

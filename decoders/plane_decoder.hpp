@@ -16,10 +16,10 @@
 /// The packets of layers -> planes of the light map (design, section 4).
 namespace relit::decoders {
 
-/// All planes of a model at one frame, in the model's order. Planes of layers that were not asked for
-/// have empty views. Holds references to the pictures: the views stay valid as long as this object,
-/// whatever the decoder does meanwhile, and may be read from any thread. Reuse one object from frame to
-/// frame, so that nothing is allocated.
+/// All planes of a model at one frame, in the model's order. Planes of layers that were not asked
+/// for have empty views. Holds references to the pictures: the views stay valid as long as this
+/// object, whatever the decoder does meanwhile, and may be read from any thread. Reuse one object
+/// from frame to frame, so that nothing is allocated.
 class FrameView {
  public:
   [[nodiscard]] std::span<const PlaneView> planes() const { return planes_; }
@@ -35,14 +35,14 @@ class FrameView {
   std::vector<VideoFrame> pictures_;  ///< two for each layer: mantissas, exponents
 };
 
-/// Checks a layer against its model: sizes, rectangles inside their pictures and, with 4:2:0, on even
-/// places, components that the chroma format has, finite positive scales, matrix entries in range.
-/// Errors: kCorrupt, kLimit, kUnsupported, each naming layer and plane.
+/// Checks a layer against its model: sizes, rectangles inside their pictures and, with 4:2:0, on
+/// even places, components that the chroma format has, finite positive scales, matrix entries in
+/// range. Errors: kCorrupt, kLimit, kUnsupported, each naming layer and plane.
 [[nodiscard]] Status check_layer(const container::ModelRecord& model,
                                  const container::LayerRecord& layer);
 
-/// One track's chunks and the decoder that plays them: a picture for a frame, in any order, cheap when
-/// frames are asked for one after another. Not thread-safe.
+/// One track's chunks and the decoder that plays them: a picture for a frame, in any order, cheap
+/// when frames are asked for one after another. Not thread-safe.
 class TrackDecoder {
  public:
   static Result<TrackDecoder> open(const VideoFormat& format, int threads);
@@ -98,8 +98,8 @@ class LayerDecoder {
   /// Takes a chunk of either of the layer's tracks; kNotFound for one of other tracks.
   Status add_chunk(const container::SegmentRecord& segment, container::ChunkRecord chunk);
 
-  /// Fills planes [first, first + plane_count()) and pictures 2·slot and 2·slot+1 of `out`, which has
-  /// room for them. Errors as TrackDecoder::picture(); the planes are empty then.
+  /// Fills planes [first, first + plane_count()) and pictures 2·slot and 2·slot+1 of `out`, which
+  /// has room for them. Errors as TrackDecoder::picture(); the planes are empty then.
   Status decode(std::uint64_t frame, std::size_t first, std::size_t slot, FrameView& out);
 
   void forget_before(std::uint64_t frame);
@@ -116,7 +116,7 @@ class LayerDecoder {
 };
 
 struct PlaneDecoderOptions {
-  int threads = 1;                  ///< of each mantissa decoder, see VideoDecoder::open()
+  int threads = 1;                       ///< of each mantissa decoder, see VideoDecoder::open()
   std::span<const std::uint8_t> wanted;  ///< by layer, 0: neither opened nor decoded; empty: all
 };
 
@@ -134,8 +134,8 @@ class PlaneDecoder {
   Status add_chunk(const container::SegmentRecord& segment, container::ChunkRecord chunk);
 
   /// The planes at `frame` (of the clip). Sequential use decodes every packet once; going elsewhere
-  /// restarts at the segment. An error of one layer leaves the others filled and its planes empty, and
-  /// the first error is returned. Errors: kNotFound (chunk missing), kCorrupt (damage).
+  /// restarts at the segment. An error of one layer leaves the others filled and its planes empty,
+  /// and the first error is returned. Errors: kNotFound (chunk missing), kCorrupt (damage).
   Status frame(std::uint64_t frame, FrameView& out);
   Result<FrameView> frame(std::uint64_t frame);
 
@@ -154,8 +154,8 @@ class PlaneDecoder {
 [[nodiscard]] double plane_value(const PlaneView& plane, int x, int y);
 
 /// T[n,c] = μ[n,c] + Σ_k M[n,c,k]·value_k, summed in double precision. Empty planes count as zero.
-/// `out` is float [coefficients][3][H][W]. Errors: kInvalid when sizes do not fit. Prediction planes
-/// are not applied (the model's normals are needed for that).
+/// `out` is float [coefficients][3][H][W]. Errors: kInvalid when sizes do not fit. Prediction
+/// planes are not applied (the model's normals are needed for that).
 Status reconstruct(std::span<const PlaneView> planes, const container::ModelRecord& model,
                    std::span<const container::LayerRecord> layers, std::span<float> out);
 

@@ -17,8 +17,8 @@ Result<TrackDecoder> TrackDecoder::open(const VideoFormat& format, int threads) 
 
 Status TrackDecoder::add_chunk(const container::SegmentRecord& segment,
                                container::ChunkRecord chunk) {
-  const std::string where = "track " + std::to_string(track_id_) + ", segment " +
-                            std::to_string(segment.index) + ": ";
+  const std::string where =
+      "track " + std::to_string(track_id_) + ", segment " + std::to_string(segment.index) + ": ";
   if (segment.frame_count == 0 || segment.frame_count > limits::kFramesPerSegment ||
       segment.first_frame > limits::kFrames || chunk.packets.size() > limits::kPacketsPerChunk) {
     return fail(ErrorCode::kLimit, where + "too many frames or packets, or none");
@@ -59,7 +59,9 @@ TrackDecoder::Chunks::const_iterator TrackDecoder::find(std::uint64_t frame) con
   return frame < it->second.end_frame ? it : chunks_.end();
 }
 
-bool TrackDecoder::has_segment_of(std::uint64_t frame) const { return find(frame) != chunks_.end(); }
+bool TrackDecoder::has_segment_of(std::uint64_t frame) const {
+  return find(frame) != chunks_.end();
+}
 
 void TrackDecoder::restart(std::uint64_t first_frame) {
   // Every segment is drained to its end or given up, so the decoder always starts at a key packet.
@@ -96,9 +98,9 @@ void TrackDecoder::feed(const Chunk& chunk) {
     return;
   }
   skipping_ = false;
-  const auto bytes = std::span(chunk.record.data)
-                         .subspan(static_cast<std::size_t>(packet.offset),
-                                  static_cast<std::size_t>(packet.size));
+  const auto bytes =
+      std::span(chunk.record.data)
+          .subspan(static_cast<std::size_t>(packet.offset), static_cast<std::size_t>(packet.size));
   if (Status sent = decoder_.send(bytes, packet.pts, packet.key); !sent) {
     note_damage(std::move(sent).error());
   }
@@ -119,10 +121,11 @@ void TrackDecoder::advance(const Chunk& chunk) {
       const std::int64_t after = current_.empty() ? -1 : current_.pts();
       const bool known = std::binary_search(chunk.shown.begin(), chunk.shown.end(), ahead_.pts());
       if (known && ahead_.pts() > after) return;
-      note_damage({ErrorCode::kCorrupt, "track " + std::to_string(track_id_) +
-                                            ": a picture with the time stamp of none of the packets, "
-                                            "or out of order, after frame " +
-                                            std::to_string(after)});
+      note_damage(
+          {ErrorCode::kCorrupt, "track " + std::to_string(track_id_) +
+                                    ": a picture with the time stamp of none of the packets, "
+                                    "or out of order, after frame " +
+                                    std::to_string(after)});
       ahead_.clear();
       continue;
     }

@@ -33,8 +33,8 @@ std::string track_name(const VideoFormat& format) {
   return "track " + std::to_string(format.track_id) + " (" + format.codec + ")";
 }
 
-/// Whether pictures of `pixel` hold the planes of `format` as their components. Luma streams may come
-/// with chroma that nobody reads (H.264, VP9); 4:4:4 ones may be labelled as RGB.
+/// Whether pictures of `pixel` hold the planes of `format` as their components. Luma streams may
+/// come with chroma that nobody reads (H.264, VP9); 4:4:4 ones may be labelled as RGB.
 bool acceptable(const VideoFormat& format, AVPixelFormat pixel) {
   const AVPixFmtDescriptor* d = av_pix_fmt_desc_get(pixel);
   if (d == nullptr) return false;
@@ -83,6 +83,13 @@ Status check_format(const VideoFormat& format) {
                                        std::to_string(format.height) + ", allowed are 1 to " +
                                        std::to_string(limit) + " samples a side");
   }
+  // FFmpeg 5.1 breaks its own heap with FFV1 pictures of a few samples.
+  if (format.codec == "ffv1" && std::min(format.width, format.height) < 16) {
+    return fail(ErrorCode::kUnsupported, track_name(format) + ": FFV1 pictures of " +
+                                             std::to_string(format.width) + "x" +
+                                             std::to_string(format.height) +
+                                             ", at least 16x16 is needed");
+  }
   if (format.bit_depth != 8 && format.bit_depth != 10) {
     return fail(ErrorCode::kInvalid, track_name(format) + ": " + std::to_string(format.bit_depth) +
                                          " bits a sample, allowed are 8 and 10");
@@ -102,7 +109,8 @@ VideoFrame::VideoFrame() : frame_(av_frame_alloc()) {}
 
 VideoFrame::VideoFrame(const VideoFrame& other) : VideoFrame() { *this = other; }
 
-VideoFrame::VideoFrame(VideoFrame&& other) noexcept : frame_(std::exchange(other.frame_, nullptr)) {}
+VideoFrame::VideoFrame(VideoFrame&& other) noexcept
+    : frame_(std::exchange(other.frame_, nullptr)) {}
 
 VideoFrame& VideoFrame::operator=(const VideoFrame& other) {
   if (this == &other) return *this;
@@ -129,8 +137,7 @@ void VideoFrame::clear() {
 std::int64_t VideoFrame::pts() const { return empty() ? AV_NOPTS_VALUE : frame_->pts; }
 
 SampleView VideoFrame::component(int index) const {
-  const AVPixFmtDescriptor* d =
-      av_pix_fmt_desc_get(static_cast<AVPixelFormat>(frame_->format));
+  const AVPixFmtDescriptor* d = av_pix_fmt_desc_get(static_cast<AVPixelFormat>(frame_->format));
   // Planes, not components: AVPixFmtDescriptor lists those of GBR formats as R, G, B, while the
   // bitstream's (and the data pointers') order is G, B, R.
   const bool chroma = index > 0;
@@ -178,8 +185,10 @@ Result<VideoDecoder> VideoDecoder::open(const VideoFormat& format, int threads) 
   }
   context.width = format.width;
   context.height = format.height;
-  // Codecs round the picture up to their largest block before they compare.
-  context.max_pixels = std::int64_t{(format.width + 127) & ~127} * ((format.height + 127) & ~127);
+  // Codecs hold more than the picture against this: it is rounded up to their largest block, and the
+  // edge buffer of the MPEG family has 280 rows of any width.
+  context.max_pixels = std::int64_t{((format.width + 127) & ~127) + 256} *
+                       std::max((format.height + 127) & ~127, 512);
   context.thread_count = std::clamp(threads, 1, 64);
   context.thread_type = FF_THREAD_FRAME | FF_THREAD_SLICE;
   context.idct_algo = FF_IDCT_SIMPLE;
@@ -192,9 +201,8 @@ Result<VideoDecoder> VideoDecoder::open(const VideoFormat& format, int threads) 
   context.get_format = choose_format;
   const int error = avcodec_open2(&context, codec, nullptr);
   if (error < 0) {
-    return fail(ErrorCode::kCorrupt, track_name(format) +
-                                         ": the decoder does not open: " + describe(error) +
-                                         "; its codec_private may be damaged");
+    return fail(ErrorCode::kCorrupt, track_name(format) + ": the decoder does not open: " +
+                                         describe(error) + "; its codec_private may be damaged");
   }
   decoder.format_ = format;
   decoder.format_.codec_private = {};
@@ -257,11 +265,10 @@ Result<VideoDecoder::Received> VideoDecoder::receive(VideoFrame& out) {
 Status VideoDecoder::check(const AVFrame& frame) const {
   const auto where = [&] { return track_name(format_) + ", frame " + std::to_string(frame.pts); };
   if (frame.width != format_.width || frame.height != format_.height) {
-    return fail(ErrorCode::kCorrupt, where() + ": a picture of " + std::to_string(frame.width) +
-                                         "x" + std::to_string(frame.height) +
-                                         ", the layer's record promises " +
-                                         std::to_string(format_.width) + "x" +
-                                         std::to_string(format_.height));
+    return fail(ErrorCode::kCorrupt,
+                where() + ": a picture of " + std::to_string(frame.width) + "x" +
+                    std::to_string(frame.height) + ", the layer's record promises " +
+                    std::to_string(format_.width) + "x" + std::to_string(format_.height));
   }
   const auto pixel = static_cast<AVPixelFormat>(frame.format);
   if (!acceptable(format_, pixel)) {

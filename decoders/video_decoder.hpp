@@ -29,8 +29,8 @@ struct VideoFormat {
   std::uint32_t track_id = 0;  ///< for messages
 };
 
-/// Counted reference to a decoded picture. Copies share the samples; clear() and assignment give them
-/// back to the decoder's pool. May outlive the decoder and may be read from any thread.
+/// Counted reference to a decoded picture. Copies share the samples; clear() and assignment give
+/// them back to the decoder's pool. May outlive the decoder and may be read from any thread.
 class VideoFrame {
  public:
   VideoFrame();
@@ -57,8 +57,8 @@ class VideoFrame {
 class VideoDecoder {
  public:
   /// Errors: kUnsupported (codec outside the list, or missing from this libavcodec), kLimit,
-  /// kInvalid, kCorrupt (codec_private). `threads` > 1 decodes so many frames at once, each of which
-  /// adds a packet of delay and a picture of memory; the samples are the same.
+  /// kInvalid, kCorrupt (codec_private). `threads` > 1 decodes so many frames at once, each of
+  /// which adds a packet of delay and a picture of memory; the samples are the same.
   static Result<VideoDecoder> open(const VideoFormat& format, int threads = 1);
 
   VideoDecoder(VideoDecoder&&) noexcept;

@@ -1,0 +1,297 @@
+// SPDX-License-Identifier: MIT
+#include "bake_minimal/plane_encoder.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <cstring>
+#include <exception>
+#include <numeric>
+#include <string>
+#include <thread>
+#include <utility>
+
+namespace relit::bake {
+namespace {
+
+using container::LayerRecord;
+
+/// Writes `samples` (width × height) at (x, y) and repeats the last column and row until the tile
+/// has `padded_width` × `padded_height`.
+struct TileCopy {
+  std::span<const std::uint16_t> samples;
+  int width, height;
+  int x, y;
+  int padded_width, padded_height;
+};
+
+void store(const TileCopy& tile, const SampleTarget& target) {
+  for (int row = 0; row < tile.padded_height; ++row) {
+    const std::uint16_t* source =
+        tile.samples.data() + std::ptrdiff_t{std::min(row, tile.height - 1)} * tile.width;
+    std::uint8_t* line = target.data + (tile.y + row) * target.stride_bytes +
+                         std::ptrdiff_t{tile.x} * target.bytes_per_sample;
+    for (int column = 0; column < tile.padded_width; ++column) {
+      const std::uint16_t sample = source[std::min(column, tile.width - 1)];
+      if (target.bytes_per_sample == 1) {
+        line[column] = static_cast<std::uint8_t>(sample);
+      } else {
+        std::memcpy(line + 2 * column, &sample, sizeof sample);
+      }
+    }
+  }
+}
+
+int padded(int side) { return (side + 15) & ~15; }
+
+VideoSettings mantissa_settings(const LayerRecord& record, const CodingOptions& o) {
+  VideoSettings s;
+  s.codec = record.codec;
+  s.width = record.coded_width;
+  s.height = record.coded_height;
+  s.chroma = record.chroma;
+  s.bit_depth = record.bit_depth;
+  s.lossless = record.lossless;
+  s.crf = *o.crf;
+  s.preset = o.preset;
+  s.reference_frames = o.reference_frames;
+  s.segment_frames = o.segment_frames;
+  return s;
+}
+
+/// FFV1 counts pictures, of which a segment has one for each hold.
+VideoSettings exponent_settings(const LayerRecord& record, const RangeScan& scan) {
+  const int segment = scan.options().segment_frames, hold = scan.hold_frames();
+  VideoSettings s;
+  s.codec = record.exponent_codec;
+  s.width = record.exponent_width;
+  s.height = record.exponent_height;
+  s.lossless = true;
+  s.segment_frames = (segment + hold - 1) / hold;
+  return s;
+}
+
+}  // namespace
+
+PlaneEncoder::PlaneEncoder(RangeScan scan, const ModelIds& ids)
+    : scan_(std::move(scan)),
+      ids_(ids),
+      quantiser_(scan_.shape(), scan_.options()),
+      steps_(scan_.steps()) {
+  model_.id = ids.model_id;
+  model_.clip_id = ids.clip_id;
+  model_.order = static_cast<std::uint8_t>(scan_.shape().order);
+  model_.width = static_cast<std::uint16_t>(scan_.shape().width);
+  model_.height = static_cast<std::uint16_t>(scan_.shape().height);
+  model_.mean = scan_.mean();
+}
+
+Result<PlaneEncoder> PlaneEncoder::begin(RangeScan scan, const ModelIds& ids) {
+  if (scan.frame_count() == 0) return fail(ErrorCode::kInvalid, "the clip has no frames");
+  PlaneEncoder encoder(std::move(scan), ids);
+  const TransferShape& shape = encoder.scan_.shape();
+  RELIT_ASSIGN(std::vector<LayerPlan> plans,
+               plan_layers(shape.order, shape.width, shape.height, encoder.scan_.options(),
+                           {ids.model_id, ids.first_layer_id, ids.first_track_id}));
+  for (LayerPlan& plan : plans) {
+    auto state = std::make_unique<LayerState>();
+    state->plan = std::move(plan);
+    RELIT_TRY(encoder.open_layer(*state));
+    encoder.layers_.push_back(state->plan.record);
+    encoder.states_.push_back(std::move(state));
+  }
+  return encoder;
+}
+
+Status PlaneEncoder::open_layer(LayerState& layer) {
+  LayerRecord& record = layer.plan.record;
+  const auto components = static_cast<std::size_t>(component_count(quantiser_.basis()));
+  for (std::size_t k = 0; k < record.planes.size(); ++k) {
+    const auto n = static_cast<std::size_t>(layer.plan.coefficients[k / components]);
+    record.planes[k].scale = static_cast<float>(steps_[n][k % components].scale);
+  }
+  RELIT_ASSIGN(VideoEncoder mantissas,
+               VideoEncoder::open(mantissa_settings(record, scan_.options())));
+  record.codec_private = mantissas.codec_private();
+  layer.mantissas.emplace(std::move(mantissas));
+  layer.mantissa_track.id = record.mantissa_track;
+  if (record.has_exponents) {
+    RELIT_ASSIGN(VideoEncoder exponents,
+                 VideoEncoder::open(exponent_settings(record, scan_)));
+    record.exponent_private = exponents.codec_private();
+    layer.exponents.emplace(std::move(exponents));
+    layer.exponent_track.id = record.exponent_track;
+  }
+  return {};
+}
+
+Status PlaneEncoder::encode_frame(std::span<const float> transfer) {
+  if (next_frame_ >= scan_.frame_count()) {
+    return fail(ErrorCode::kInvalid, "more frames than the " + std::to_string(scan_.frame_count()) +
+                                         " that were scanned");
+  }
+  RELIT_TRY(check_transfer(scan_.shape(), transfer, next_frame_));
+  RELIT_TRY(for_each_layer([&](LayerState& layer) { return encode_layer(layer, transfer); }));
+  ++next_frame_;
+  return {};
+}
+
+Status PlaneEncoder::encode_layer(LayerState& layer, std::span<const float> transfer) {
+  const bool first_of_segment =
+      next_frame_ % static_cast<std::uint64_t>(scan_.options().segment_frames) == 0;
+  const auto pts = static_cast<std::int64_t>(next_frame_);
+  RELIT_TRY(layer.mantissas->begin_picture());
+  if (layer.exponents) RELIT_TRY(layer.exponents->begin_picture());
+  for (std::size_t tile = 0; tile < layer.plan.coefficients.size(); ++tile) {
+    RELIT_TRY(quantise_tile(layer, tile, transfer));
+  }
+  RELIT_TRY(layer.mantissas->encode(pts, first_of_segment, layer.packets));
+  RELIT_TRY(collect(layer.mantissa_track, layer.packets));
+  if (layer.exponents && scan_.begins_hold(next_frame_)) {
+    RELIT_TRY(layer.exponents->encode(pts, first_of_segment, layer.packets));
+    RELIT_TRY(collect(layer.exponent_track, layer.packets));
+  }
+  return {};
+}
+
+Status PlaneEncoder::quantise_tile(LayerState& layer, std::size_t tile,
+                                   std::span<const float> transfer) {
+  const LayerRecord& record = layer.plan.record;
+  const int n = layer.plan.coefficients[tile];
+  const int components = component_count(quantiser_.basis());
+  quantiser_.split(transfer, n, layer.components);
+  layer.block_exponents.clear();
+  if (layer.exponents) {
+    const std::span<const std::uint8_t> held = scan_.held_exponents(next_frame_, n);
+    layer.block_exponents.assign(held.begin(), held.end());
+    if (held.empty()) {
+      layer.block_exponents.resize(quantiser_.blocks());
+      quantiser_.raise_exponents(layer.components, layer.block_exponents);
+    }
+    const container::Rect& rect =
+        record.planes[tile * static_cast<std::size_t>(components)].exponent_rect;
+    layer.samples.assign(layer.block_exponents.begin(), layer.block_exponents.end());
+    store({layer.samples, rect.width, rect.height, rect.x, rect.y, rect.width, rect.height},
+          layer.exponents->target(0));
+  }
+  for (int c = 0; c < components; ++c) {
+    const container::Rect& rect =
+        record.planes[tile * static_cast<std::size_t>(components) + static_cast<std::size_t>(c)]
+            .mantissa_rect;
+    const PlaneQuantiser::Step& step =
+        steps_[static_cast<std::size_t>(n)][static_cast<std::size_t>(c)];
+    if (!quantiser_.quantise(layer.components, c, step, layer.block_exponents, layer.samples)) {
+      return fail(ErrorCode::kInvalid, "frame " + std::to_string(next_frame_) + ", coefficient " +
+                                           std::to_string(n) +
+                                           " exceeds its range: it is not the frame that was "
+                                           "scanned");
+    }
+    const int shift = quantiser_.halved(c) ? 1 : 0;
+    store({layer.samples, (rect.width + shift) >> shift, (rect.height + shift) >> shift,
+           rect.x >> shift, rect.y >> shift, padded(rect.width) >> shift,
+           padded(rect.height) >> shift},
+          layer.mantissas->target(c));
+  }
+  return {};
+}
+
+Status PlaneEncoder::collect(Track& track, std::vector<CodedPacket>& packets) const {
+  for (const CodedPacket& packet : packets) {
+    const auto frames = static_cast<std::int64_t>(scan_.options().segment_frames);
+    const auto segment = static_cast<std::uint32_t>(packet.pts / frames);
+    const bool begins = segment == track.begun;
+    // What the format promises of a segment, whatever the encoder at hand does.
+    if (packet.bytes.empty() || segment > track.begun || segment + 1 < track.begun ||
+        (begins && (!packet.key || packet.pts % frames != 0))) {
+      return fail(ErrorCode::kEnvironment, "the encoder's segments are not closed at frame " +
+                                               std::to_string(packet.pts) +
+                                               ": use another --codec or --preset");
+    }
+    if (begins) {
+      track.chunks.emplace_back();
+      track.chunks.back().track_id = track.id;
+      track.chunks.back().segment_index = ids_.first_segment + segment;
+      ++track.begun;
+    }
+    container::ChunkRecord& chunk = track.chunks.back();
+    chunk.packets.push_back({packet.pts, packet.key, chunk.data.size(), packet.bytes.size()});
+    chunk.data.insert(chunk.data.end(), packet.bytes.begin(), packet.bytes.end());
+  }
+  packets.clear();
+  return {};
+}
+
+Status PlaneEncoder::finish() {
+  if (finished_) return {};
+  if (next_frame_ != scan_.frame_count()) {
+    return fail(ErrorCode::kInvalid, std::to_string(next_frame_) + " frames were given, " +
+                                         std::to_string(scan_.frame_count()) + " were scanned");
+  }
+  RELIT_TRY(for_each_layer([&](LayerState& layer) { return finish_layer(layer); }));
+  finished_ = true;
+  return {};
+}
+
+Status PlaneEncoder::finish_layer(LayerState& layer) const {
+  RELIT_TRY(layer.mantissas->finish(layer.packets));
+  RELIT_TRY(collect(layer.mantissa_track, layer.packets));
+  if (layer.exponents) {
+    RELIT_TRY(layer.exponents->finish(layer.packets));
+    RELIT_TRY(collect(layer.exponent_track, layer.packets));
+  }
+  return {};
+}
+
+std::optional<EncodedSegment> PlaneEncoder::take_segment() {
+  // A chunk is complete when its successor has begun: decoding order never goes back.
+  const auto complete = [&](const Track& track) {
+    return finished_ ? !track.chunks.empty() : track.begun > next_segment_ + 1;
+  };
+  for (const auto& state : states_) {
+    if (!complete(state->mantissa_track)) return {};
+    if (state->exponents && !complete(state->exponent_track)) return {};
+  }
+  const auto frames = static_cast<std::uint64_t>(scan_.options().segment_frames);
+  EncodedSegment encoded;
+  encoded.segment.index = ids_.first_segment + next_segment_;
+  encoded.segment.clip_id = ids_.clip_id;
+  encoded.segment.first_frame = next_segment_ * frames;
+  encoded.segment.frame_count = static_cast<std::uint32_t>(
+      std::min(frames, scan_.frame_count() - encoded.segment.first_frame));
+  for (const auto& state : states_) {
+    encoded.chunks.push_back(std::move(state->mantissa_track.chunks.front()));
+    state->mantissa_track.chunks.pop_front();
+    if (!state->exponents) continue;
+    encoded.chunks.push_back(std::move(state->exponent_track.chunks.front()));
+    state->exponent_track.chunks.pop_front();
+  }
+  ++next_segment_;
+  return encoded;
+}
+
+Status PlaneEncoder::for_each_layer(const std::function<Status(LayerState&)>& run) {
+  std::vector<Status> results(states_.size());
+  std::atomic<std::size_t> next = 0;
+  const auto work = [&] {
+    // From the last layer on, which is the largest.
+    for (std::size_t i; (i = next++) < states_.size();) {
+      const std::size_t layer = states_.size() - 1 - i;
+      try {
+        results[layer] = run(*states_[layer]);
+      } catch (const std::exception& e) {
+        results[layer] = fail(ErrorCode::kOutOfMemory, e.what());
+      }
+    }
+  };
+  const std::size_t threads =
+      std::min(static_cast<std::size_t>(scan_.options().threads), states_.size());
+  std::vector<std::thread> helpers;
+  for (std::size_t t = 1; t < threads; ++t) helpers.emplace_back(work);
+  work();
+  for (std::thread& helper : helpers) helper.join();
+  for (Status& result : results) {
+    if (!result) return std::move(result);
+  }
+  return {};
+}
+
+}  // namespace relit::bake

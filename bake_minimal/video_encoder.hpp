@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "container/base/result.hpp"
+#include "container/records.hpp"
+
+struct AVCodecContext;
+struct AVFrame;
+struct AVPacket;
+
+/// libavcodec's encoders, fed exact samples: no scaler, no conversion, one thread, so that the same
+/// pictures always give the same bytes.
+namespace relit::bake {
+
+struct VideoSettings {
+  std::string codec;  ///< as CodingOptions::codec
+  int width = 0;
+  int height = 0;
+  container::Chroma chroma = container::Chroma::kLuma;
+  int bit_depth = 8;
+  bool lossless = false;
+  double crf = 18;  ///< as CodingOptions::crf
+  std::string preset;
+  int reference_frames = 4;
+  int segment_frames = 25;  ///< pictures a segment: how often there is a key picture
+};
+
+/// Samples to be written: row y at data + y·stride_bytes, two bytes in the machine's order above 8
+/// bits.
+struct SampleTarget {
+  std::uint8_t* data = nullptr;
+  std::ptrdiff_t stride_bytes = 0;
+  int width = 0;
+  int height = 0;
+  int bytes_per_sample = 1;
+};
+
+struct CodedPacket {
+  std::int64_t pts = 0;
+  bool key = false;
+  std::vector<std::uint8_t> bytes;
+};
+
+/// One stream. Not thread-safe; different encoders may run on different threads.
+class VideoEncoder {
+ public:
+  /// Errors: kEnvironment when libavcodec lacks the encoder or refuses the settings.
+  static Result<VideoEncoder> open(const VideoSettings& settings);
+
+  VideoEncoder(VideoEncoder&&) noexcept;
+  VideoEncoder& operator=(VideoEncoder&&) noexcept;
+  ~VideoEncoder();
+
+  /// What a decoder needs before the first packet: LayerRecord::codec_private.
+  [[nodiscard]] std::vector<std::uint8_t> codec_private() const;
+
+  /// Makes the next picture writable. It still holds the previous one's samples; the first starts
+  /// at mid-grey. Call before target() for every picture. Errors: kOutOfMemory.
+  Status begin_picture();
+  [[nodiscard]] SampleTarget target(int component);
+
+  /// Encodes the picture as frame `pts`, greater than any before; `first_of_segment` makes it an
+  /// IDR that no later picture reaches across. Appends what packets come out, in decoding order.
+  /// Errors: kEnvironment.
+  Status encode(std::int64_t pts, bool first_of_segment, std::vector<CodedPacket>& out);
+  /// Appends all that is still inside. Nothing can be encoded afterwards.
+  Status finish(std::vector<CodedPacket>& out);
+
+ private:
+  VideoEncoder() = default;
+  Status receive(std::vector<CodedPacket>& out);
+  struct Deleter {
+    void operator()(AVCodecContext* context) const;
+    void operator()(AVFrame* frame) const;
+    void operator()(AVPacket* packet) const;
+  };
+  VideoSettings settings_;
+  std::unique_ptr<AVCodecContext, Deleter> context_;
+  std::unique_ptr<AVFrame, Deleter> picture_;
+  std::unique_ptr<AVPacket, Deleter> packet_;
+};
+
+}  // namespace relit::bake
