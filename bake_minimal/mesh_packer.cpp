@@ -41,6 +41,8 @@ class ScenePacker {
     ScenePose pose;
     scene_.sample(options_.clip, 0, pose);
     scene_.world_matrices(pose, world_);
+    scene_.sample(-1, 0, pose);
+    scene_.world_matrices(pose, rest_world_);
     RELIT_TRY(prepare());
     build_palette();
     RELIT_TRY(pack_used_materials());
@@ -109,33 +111,22 @@ class ScenePacker {
       RELIT_TRY(check_primitive(scene_, static_cast<std::uint32_t>(i)));
       const auto node = static_cast<std::size_t>(p.node);
       const bool still = p.skin < 0 && !moving_[node];
-      RELIT_ASSIGN(PreparedPrimitive prepared,
-                   prepare_primitive(scene_, static_cast<std::uint32_t>(i), still, mirrored(p),
-                                     world_[node]));
+      RELIT_ASSIGN(
+          PreparedPrimitive prepared,
+          prepare_primitive(scene_, static_cast<std::uint32_t>(i), still, turned(p), world_[node]));
       prepared_.push_back(std::move(prepared));
     }
     return {};
   }
 
-  /// Whether the first pose turns the primitive inside out: by its node, or by most of its joints,
-  /// for the node of a skinned mesh does not count.
-  bool mirrored(const Primitive& p) const {
-    const auto determinant = [](const glm::mat4& m) {
-      return glm::determinant(glm::dmat3(glm::dmat4(m)));
+  /// Scenes are wound for the rest pose; whether the first frame mirrors a rigid primitive anew.
+  bool turned(const Primitive& p) const {
+    if (p.skin >= 0) return false;
+    const auto mirrored = [&](const std::vector<glm::mat4>& world) {
+      const glm::dmat4 m(world[static_cast<std::size_t>(p.node)]);
+      return glm::determinant(glm::dmat3(m)) < 0;
     };
-    if (p.skin < 0) return determinant(world_[static_cast<std::size_t>(p.node)]) < 0;
-    const Skin& skin = scene_.skins[static_cast<std::size_t>(p.skin)];
-    std::vector<double> sign;
-    for (std::size_t j = 0; j < skin.joints.size(); ++j) {
-      const double d = determinant(world_[static_cast<std::size_t>(skin.joints[j])]) *
-                       determinant(inverse_bind(skin, j));
-      sign.push_back(d < 0 ? -1 : d > 0 ? 1 : 0);
-    }
-    double sum = 0;
-    for (std::size_t i = 0; i < p.joints.size(); ++i) {
-      sum += static_cast<double>(p.weights[i]) * sign[p.joints[i]];
-    }
-    return sum < 0;
+    return mirrored(world_) != mirrored(rest_world_);
   }
 
   static glm::mat4 inverse_bind(const Skin& skin, std::size_t joint) {
@@ -330,8 +321,9 @@ class ScenePacker {
   const Scene& scene_;
   const PackOptions& options_;
   PackedScene out_;
-  std::vector<bool> moving_;  ///< nodes that any clip moves
-  std::vector<glm::mat4> world_;
+  std::vector<bool> moving_;      ///< nodes that any clip moves
+  std::vector<glm::mat4> world_;  ///< at the first frame
+  std::vector<glm::mat4> rest_world_;
   std::vector<PreparedPrimitive> prepared_;
   std::vector<int> packed_node_;  ///< by scene node, -1: left out
   std::map<std::pair<std::uint32_t, Affine>, std::uint32_t> palette_;

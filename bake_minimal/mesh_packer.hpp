@@ -18,7 +18,7 @@
 namespace relit::bake {
 
 struct PackOptions {
-  int clip = -1;  ///< whose first frame decides which way mirrored nodes wind; -1: the rest pose
+  int clip = -1;         ///< that will be shown; -1: the rest pose
   bool normals = false;  ///< write the normals into the file
   int position_bits =
       14;  ///< of the longest axis of a mesh's space, 8..16; the step is the same on all axes
@@ -60,9 +60,11 @@ struct PackedScene {
 /// attribute and in their normals are merged, unused ones dropped, and triangles that name one
 /// vertex twice after that are dropped (others stay, whatever their area, for animation may open
 /// them). Primitives of one skin, or of one node, share a grid of positions, so that no cracks open
-/// between them. Rigid primitives that no clip moves are moved into model space and stand still;
-/// mirrored ones are wound the other way. Nodes that pose nothing are left out. Errors: kInvalid
-/// (numbers that are not finite, missing UVs, indices out of range), kLimit. Deterministic.
+/// between them. Rigid primitives that no clip moves are moved into model space and stand still.
+/// Primitives come wound for the rest pose; those whose node has a determinant of the other sign in
+/// the first frame of `options.clip` are wound the other way. Nodes that pose nothing are left out.
+/// Errors: kInvalid (numbers that are not finite, missing UVs, indices out of range), kLimit.
+/// Deterministic.
 [[nodiscard]] Result<PackedScene> pack_scene(const Scene& scene, const PackOptions& options);
 
 /// For files all of whose pose tracks are kVertices: removes joints, weights, morph targets and

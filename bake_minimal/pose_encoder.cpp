@@ -255,12 +255,12 @@ class PoseEncoder {
     return bytes;
   }
 
-  /// One grid for all meshes, so that vertices that coincide stay together.
-  Grid vertex_grid() {
+  /// One grid for all meshes over frames [0, end), so that vertices that coincide stay together.
+  Grid vertex_grid(std::size_t end) {
     glm::vec3 low(0), high(0);
     bool first = true;
     std::vector<std::vector<glm::vec3>> posed;
-    for (std::size_t frame = 0; frame < times_.size(); ++frame) {
+    for (std::size_t frame = 0; frame < end; ++frame) {
       pose_primitives(frame, posed);
       for (const PackedMeshSource& source : packed_.sources) {
         for (const std::uint32_t v : source.source_vertex) {
@@ -276,37 +276,49 @@ class PoseEncoder {
     return grid;
   }
 
-  /// Gives up, with what it has, once it is larger than `enough` bytes (0: never).
-  Result<std::optional<PoseEncoding>> encode_vertices(std::uint64_t enough) {
-    const Grid grid = vertex_grid();
-    PoseEncoding out = start(PoseKind::kVertices);
-    std::size_t values_per_frame = 0;
-    for (const decoders::Mesh& mesh : packed_.meshes) {
-      out.track.vertex_ranges.push_back({mesh.id, grid.offset, grid.step});
-      values_per_frame += 3 * mesh.positions.size();
-    }
-    out.vertices_bytes = packed_.meshes.size() * kVertexRangeBytes;
+  /// The packet of the segment that starts at `first`.
+  Result<std::vector<std::uint8_t>> encode_vertex_segment(std::size_t first, const Grid& grid) {
+    const std::size_t frames =
+        std::min<std::size_t>(options_.segment_frames, times_.size() - first);
+    PosePacketShape shape{0, frames, PoseKind::kVertices};
+    for (const decoders::Mesh& mesh : packed_.meshes) shape.values += 3 * mesh.positions.size();
+    RELIT_TRY(check_packet(shape));
+    std::vector<std::uint16_t> values;
+    values.reserve(shape.values * frames);
     std::vector<std::vector<glm::vec3>> posed;
-    for (std::size_t first = 0; first < times_.size(); first += options_.segment_frames) {
-      const std::size_t frames =
-          std::min<std::size_t>(options_.segment_frames, times_.size() - first);
-      const PosePacketShape shape{values_per_frame, frames, PoseKind::kVertices};
-      RELIT_TRY(check_packet(shape));
-      std::vector<std::uint16_t> values;
-      values.reserve(values_per_frame * frames);
-      for (std::size_t t = 0; t < frames; ++t) {
-        pose_primitives(first + t, posed);
-        for (const PackedMeshSource& source : packed_.sources) {
-          for (const std::uint32_t v : source.source_vertex) {
-            const glm::vec3& p = posed[source.primitive][v];
-            for (std::size_t i = 0; i < 3; ++i) {
-              values.push_back(grid.nearest(p[static_cast<int>(i)], i));
-            }
+    for (std::size_t t = 0; t < frames; ++t) {
+      pose_primitives(first + t, posed);
+      for (const PackedMeshSource& source : packed_.sources) {
+        for (const std::uint32_t v : source.source_vertex) {
+          const glm::vec3& p = posed[source.primitive][v];
+          for (std::size_t i = 0; i < 3; ++i) {
+            values.push_back(grid.nearest(p[static_cast<int>(i)], i));
           }
         }
       }
-      out.packets.push_back(encode_pose_packet(values, shape));
-      out.vertices_bytes += out.packets.back().size();
+    }
+    return encode_pose_packet(values, shape);
+  }
+
+  /// Nothing once it is clear that the result has `enough` bytes or more (0: never enough).
+  Result<std::optional<PoseEncoding>> encode_vertices(std::uint64_t enough) {
+    const std::size_t first_end = std::min<std::size_t>(options_.segment_frames, times_.size());
+    if (enough > 0 && first_end < times_.size()) {
+      // One segment often is too much already; then the others need not even be posed.
+      RELIT_ASSIGN(const std::vector<std::uint8_t> probe,
+                   encode_vertex_segment(0, vertex_grid(first_end)));
+      if (probe.size() >= enough) return std::optional<PoseEncoding>();
+    }
+    const Grid grid = vertex_grid(times_.size());
+    PoseEncoding out = start(PoseKind::kVertices);
+    for (const decoders::Mesh& mesh : packed_.meshes) {
+      out.track.vertex_ranges.push_back({mesh.id, grid.offset, grid.step});
+    }
+    out.vertices_bytes = packed_.meshes.size() * kVertexRangeBytes;
+    for (std::size_t first = 0; first < times_.size(); first += options_.segment_frames) {
+      RELIT_ASSIGN(std::vector<std::uint8_t> packet, encode_vertex_segment(first, grid));
+      out.vertices_bytes += packet.size();
+      out.packets.push_back(std::move(packet));
       if (enough > 0 && out.vertices_bytes >= enough) return std::optional<PoseEncoding>();
     }
     return std::optional<PoseEncoding>(std::move(out));

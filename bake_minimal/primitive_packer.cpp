@@ -39,8 +39,9 @@ bool all_finite(const std::vector<T>& vectors) {
 void move_to_world(PreparedPrimitive& out, const glm::mat4& world) {
   const glm::dmat4 w(world);
   const glm::dmat3 linear(w);
-  const glm::dmat3 cofactor(glm::cross(linear[1], linear[2]), glm::cross(linear[2], linear[0]),
-                            glm::cross(linear[0], linear[1]));
+  glm::dmat3 cofactor(glm::cross(linear[1], linear[2]), glm::cross(linear[2], linear[0]),
+                      glm::cross(linear[0], linear[1]));
+  if (glm::determinant(linear) < 0) cofactor = -cofactor;
   for (glm::vec3& p : out.positions) p = glm::vec3(w * glm::dvec4(glm::dvec3(p), 1.0));
   std::vector<double> lengths(out.normals.size());
   for (std::size_t v = 0; v < out.normals.size(); ++v) {
@@ -352,7 +353,7 @@ Status check_primitive(const Scene& scene, std::uint32_t index) {
 }
 
 Result<PreparedPrimitive> prepare_primitive(const Scene& scene, std::uint32_t primitive, bool still,
-                                            bool mirrored, const glm::mat4& world) {
+                                            bool turned, const glm::mat4& world) {
   const Primitive& p = scene.primitives[primitive];
   PreparedPrimitive out;
   out.primitive = primitive;
@@ -361,15 +362,9 @@ Result<PreparedPrimitive> prepare_primitive(const Scene& scene, std::uint32_t pr
   out.normals = p.normals;
   out.morphs = p.morph_targets;
   out.indices = p.indices;
-  if (mirrored) {
-    // The cofactor matrix of a reflection turns normals round, as the reflection does the winding:
-    // with both turned here, posing needs no exceptions.
+  if (turned) {
     for (std::size_t i = 0; i + 2 < out.indices.size(); i += 3) {
       std::swap(out.indices[i + 1], out.indices[i + 2]);
-    }
-    for (glm::vec3& n : out.normals) n = -n;
-    for (MorphDelta& m : out.morphs) {
-      for (glm::vec3& n : m.normals) n = -n;
     }
   }
   if (still) move_to_world(out, world);

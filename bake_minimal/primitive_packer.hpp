@@ -36,12 +36,11 @@ struct PrimitiveGrids {
 /// Sizes, indices, joints and finite numbers of a primitive. Errors: kInvalid, kLimit.
 [[nodiscard]] Status check_primitive(const Scene& scene, std::uint32_t primitive);
 
-/// Brings a checked primitive into its mesh's space: moved by `world` where it is `still`, wound
-/// the other way with turned normals where `mirrored`. Errors: kInvalid when that leads to
-/// infinity.
+/// Brings a checked primitive into its mesh's space: moved by `world` where it is `still`, its
+/// triangles wound the other way where `turned`. Errors: kInvalid when that leads to infinity.
 [[nodiscard]] Result<PreparedPrimitive> prepare_primitive(const Scene& scene,
                                                           std::uint32_t primitive, bool still,
-                                                          bool mirrored, const glm::mat4& world);
+                                                          bool turned, const glm::mat4& world);
 
 /// A mesh record with the mesh as the player decodes it, and where its parts came from.
 struct PackedPart {

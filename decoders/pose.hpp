@@ -94,9 +94,9 @@ class PoseTrack {
   std::vector<Segment> segments_;  ///< by first frame, without overlap
 };
 
-/// Posed positions, and normals where `normals` is not empty, in model space, front faces
-/// counter-clockwise. `mesh_index` selects Pose::vertices. Sizes: mesh.positions.size(); `normals`
-/// may be empty. Normals are the mesh's own by the cofactor matrix of the blended joints, so that
+/// Posed positions, and normals where `normals` is not empty, in model space. `mesh_index` selects
+/// Pose::vertices. Sizes: mesh.positions.size(); `normals` may be empty. Normals are the mesh's own
+/// by the inverse transpose of the blended joints (cofactors times the determinant's sign), so that
 /// non-uniform and negative scales are right; where the pose is kVertices or the mesh has no
 /// normals, they are the posed triangles', weighted by area. Unit length. Allocates nothing.
 void pose_mesh(const Mesh& mesh, std::size_t mesh_index, const Pose& pose,

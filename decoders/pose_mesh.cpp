@@ -50,9 +50,10 @@ void skin(const Mesh& mesh, const Pose& pose, std::span<glm::vec3> positions,
     positions[v] = m[0] * p.x + m[1] * p.y + m[2] * p.z + m[3];
     if (normals.empty()) continue;
     const glm::vec3 n = normals[v];
-    const glm::vec3 posed =
-        glm::cross(m[1], m[2]) * n.x + glm::cross(m[2], m[0]) * n.y + glm::cross(m[0], m[1]) * n.z;
-    normals[v] = unit_or(posed, n);
+    const glm::vec3 x = glm::cross(m[1], m[2]);
+    const glm::vec3 posed = x * n.x + glm::cross(m[2], m[0]) * n.y + glm::cross(m[0], m[1]) * n.z;
+    // The cofactors of a reflection turn normals inside out.
+    normals[v] = unit_or(glm::dot(x, m[0]) < 0 ? -posed : posed, n);
   }
 }
 
