@@ -13,6 +13,9 @@
 namespace relit::bake::gltf {
 namespace {
 
+/// Times beyond it are mistakes, and would keep whoever steps through the frames busy for good.
+constexpr float kClipSeconds = 86400;
+
 Status read_times(const Document& document, int accessor, const std::string& where,
                   Channel& channel) {
   RELIT_ASSIGN(Numbers times, read_numbers(document, accessor, {where + ", input", 1}));
@@ -29,6 +32,11 @@ Status read_times(const Document& document, int accessor, const std::string& whe
                                " is not finite, negative or not after the one before; times must "
                                "increase from 0 on");
     }
+  }
+  if (channel.times.back() > kClipSeconds) {
+    return document.fail(ErrorCode::kLimit, where,
+                         "its last key is at " + std::to_string(channel.times.back()) +
+                             " s; a day is the limit: are the times frames instead of seconds?");
   }
   return {};
 }

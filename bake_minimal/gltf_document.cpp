@@ -327,12 +327,23 @@ void drop_channels_without_node(Json& json, Document& document) {
   }
 }
 
+// Optional in glTF, but tinygltf reports an error where it is missing.
+void name_missing_inverse_bind(Json& json) {
+  const auto skins = json.find("skins");
+  if (skins == json.end() || !skins->is_array()) return;
+  for (Json& skin : *skins) {
+    if (skin.is_object() && !skin.contains("inverseBindMatrices")) skin["inverseBindMatrices"] = -1;
+  }
+}
+
 // Buffers and images stay out of tinygltf's hands: it trusts the offsets of images, compares file
 // sizes for equality and reads files from the working directory.
 Status parse_model(Json json, Document& document) {
-  json.erase("buffers");
-  json.erase("images");
+  for (const char* name : {"buffers", "images", "cameras", "extensions", "extras"}) {
+    json.erase(name);
+  }
   drop_channels_without_node(json, document);
+  name_missing_inverse_bind(json);
   const std::string text = json.dump();
   json = nullptr;
   if (text.size() > std::numeric_limits<unsigned>::max()) {

@@ -252,6 +252,9 @@ Result<int> find_clip(const Scene& scene, std::string_view name_or_number) {
 }
 
 Result<Bounds> clip_bounds(const Scene& scene, int clip, double fps) {
+  if (!(fps > 0) || !std::isfinite(fps)) {
+    return fail(ErrorCode::kInvalid, "the frame rate must be a positive number");
+  }
   const double duration = clip < 0 ? 0 : scene.clips[static_cast<std::size_t>(clip)].duration_s;
   Bounds bounds{glm::vec3(std::numeric_limits<float>::max()),
                 glm::vec3(std::numeric_limits<float>::lowest())};

@@ -114,7 +114,7 @@ struct Channel {
 
 struct Clip {
   std::string name;       ///< an unnamed animation is called by its number in the file
-  double duration_s = 0;  ///< the largest key time; clips start at 0. 0: one pose
+  double duration_s = 0;  ///< the largest key time, at most a day; clips start at 0. 0: one pose
   std::vector<Channel> channels;
 };
 
@@ -163,7 +163,8 @@ struct Bounds {
 };
 
 /// The box around all primitives over the frames k/fps < duration_s of a clip (at least frame 0;
-/// -1: the rest pose), metres. Errors: kInvalid where a posed position is not finite (names it).
+/// -1: the rest pose), metres. Errors: kInvalid where a posed position is not
+/// finite (names it), or for a frame rate that is not positive.
 [[nodiscard]] Result<Bounds> clip_bounds(const Scene& scene, int clip, double fps);
 
 }  // namespace relit::bake

@@ -4,12 +4,10 @@
 extern "C" {
 #include <libavcodec/avcodec.h>
 #include <libavutil/frame.h>
-#include <libavutil/imgutils.h>
 #include <libavutil/pixdesc.h>
 #include <libswscale/swscale.h>
 }
 
-#include <algorithm>
 #include <array>
 #include <climits>
 #include <cstring>
@@ -150,7 +148,7 @@ Result<Frame> decode_frame(std::span<const std::uint8_t> bytes, std::string_view
   context->idct_algo = FF_IDCT_SIMPLE;
   context->flags |= AV_CODEC_FLAG_BITEXACT;
   // What goes wrong is told by the returned Error, not by libavcodec's own log.
-  context->log_level_offset = 1 << 10;
+  context->log_level_offset = 100;
   int status = avcodec_open2(context.get(), codec, nullptr);
   if (status >= 0) status = avcodec_send_packet(context.get(), packet.get());
   if (status >= 0) status = avcodec_send_packet(context.get(), nullptr);
@@ -166,8 +164,26 @@ Result<Frame> decode_frame(std::span<const std::uint8_t> bytes, std::string_view
   return frame;
 }
 
+/// The same samples under their modern name: the range is told to the scaler separately.
+AVPixelFormat without_range(AVPixelFormat format) {
+  switch (format) {
+    case AV_PIX_FMT_YUVJ411P:
+      return AV_PIX_FMT_YUV411P;
+    case AV_PIX_FMT_YUVJ420P:
+      return AV_PIX_FMT_YUV420P;
+    case AV_PIX_FMT_YUVJ422P:
+      return AV_PIX_FMT_YUV422P;
+    case AV_PIX_FMT_YUVJ440P:
+      return AV_PIX_FMT_YUV440P;
+    case AV_PIX_FMT_YUVJ444P:
+      return AV_PIX_FMT_YUV444P;
+    default:
+      return format;
+  }
+}
+
 Result<DecodedImage> to_rgba(const AVFrame& frame) {
-  const auto format = static_cast<AVPixelFormat>(frame.format);
+  const AVPixelFormat format = without_range(static_cast<AVPixelFormat>(frame.format));
   DecodedImage image;
   image.width = frame.width;
   image.height = frame.height;
@@ -178,11 +194,12 @@ Result<DecodedImage> to_rgba(const AVFrame& frame) {
       SWS_BILINEAR | SWS_ACCURATE_RND | SWS_FULL_CHR_H_INP | SWS_FULL_CHR_H_INT | SWS_BITEXACT,
       nullptr, nullptr, nullptr));
   if (!scaler) {
+    const char* name = av_get_pix_fmt_name(format);
     return fail(ErrorCode::kUnsupported, "pictures of sample format " +
-                                             std::string(av_get_pix_fmt_name(format)) +
+                                             std::string(name == nullptr ? "unknown" : name) +
                                              " cannot be converted; save it as 8-bit RGB");
   }
-  // JFIF: full range, BT.601. Without this a scaler may take unspecified video for limited range.
+  // JFIF: full range, BT.601. Left alone, the scaler takes it for limited range.
   const int* bt601 = sws_getCoefficients(SWS_CS_ITU601);
   sws_setColorspaceDetails(scaler.get(), bt601, 1, bt601, 1, 0, 1 << 16, 1 << 16);
   const std::array<std::uint8_t*, 1> out{image.rgba.data()};
