@@ -338,6 +338,9 @@ void Compositor::draw_unrolled(const Pass& pass, const FoldedLight& light) {
   const std::vector<float>& mixed = uniforms_;
   const auto stride = static_cast<std::size_t>(batch.stride());
   std::array<float, 4 * kMediumpLookups> weights{};
+  // E_ref of the unused ones: 2^(E - 255) is at most 1, and never an infinity that 0 would not
+  // cancel.
+  for (std::size_t i = 3; i < weights.size(); i += 4) weights[i] = 255;
   for (std::size_t g = 0; g < slots; ++g) {
     const bool used = g < static_cast<std::size_t>(count);
     const float* group = mixed.data() + (used ? 4 * g * stride : 0);

@@ -6,9 +6,16 @@ vec3 decode_srgb(vec3 c) {
   return mix(high, low, vec3(lessThanEqual(c, vec3(0.04045))));
 }
 
+// 1.055, or the half float above it, so that white does not come out a step too dark.
+#ifdef RELIT_MEDIUMP
+#define SRGB_GAIN 1.0557
+#else
+#define SRGB_GAIN 1.055
+#endif
+
 vec3 encode_srgb(vec3 c) {
   vec3 low = c * 12.92;
-  vec3 high = 1.055 * pow(max(c, vec3(0.0001)), vec3(1.0 / 2.4)) - 0.055;
+  vec3 high = SRGB_GAIN * pow(max(c, vec3(0.0001)), vec3(1.0 / 2.4)) - 0.055;
   return mix(high, low, vec3(lessThanEqual(c, vec3(0.0031308))));
 }
 
