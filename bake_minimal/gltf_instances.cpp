@@ -27,8 +27,8 @@ Unexpected bad_vertex(const Document& document, const MeshPart& part, std::size_
                        "vertex " + std::to_string(part.source[v]) + ": " + what);
 }
 
-/// The influences of one vertex that count, with normalised weights, at most `out.size()`, the
-/// largest if there are more. Returns how many there were.
+/// The influences of one vertex that count, with normalised weights: the 8 largest if there are
+/// more. Returns how many there were.
 Result<std::size_t> read_vertex(const Document& document, const MeshPart& part,
                                 std::size_t joint_count, std::size_t v,
                                 std::vector<Influence>& out) {

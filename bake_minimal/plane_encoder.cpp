@@ -115,8 +115,7 @@ Status PlaneEncoder::open_layer(LayerState& layer) {
   layer.mantissas.emplace(std::move(mantissas));
   layer.mantissa_track.id = record.mantissa_track;
   if (record.has_exponents) {
-    RELIT_ASSIGN(VideoEncoder exponents,
-                 VideoEncoder::open(exponent_settings(record, scan_)));
+    RELIT_ASSIGN(VideoEncoder exponents, VideoEncoder::open(exponent_settings(record, scan_)));
     record.exponent_private = exponents.codec_private();
     layer.exponents.emplace(std::move(exponents));
     layer.exponent_track.id = record.exponent_track;

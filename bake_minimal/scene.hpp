@@ -60,14 +60,13 @@ struct MorphDelta {
 /// triangles are counter-clockwise from the front in the rest pose, mirrored nodes included.
 struct Primitive {
   std::string name;  ///< of its mesh; with "/k" where the mesh has several primitives
-  int material =
-      0;          ///< into Scene::materials, always valid (a default material is added if needed)
-  int node = -1;  ///< that carries the mesh
-  int skin = -1;  ///< into Scene::skins, or -1: rigid with its node
+  int material = 0;  ///< into Scene::materials, always valid (a default one is added if needed)
+  int node = -1;     ///< that carries the mesh
+  int skin = -1;     ///< into Scene::skins, or -1: rigid with its node
   std::vector<glm::vec3> positions;
   std::vector<glm::vec3> normals;  ///< unit length; computed where the file has none
-  std::vector<std::vector<glm::vec2>>
-      texcoords;                      ///< by set; zeros for a set that only the material knows
+  /// By set; zeros for a set that only the material knows.
+  std::vector<std::vector<glm::vec2>> texcoords;
   std::vector<glm::vec4> colors;      ///< linear; may be empty
   int influences_per_vertex = 0;      ///< 0, 4 or 8
   std::vector<std::uint16_t> joints;  ///< into the skin's joints
@@ -163,8 +162,8 @@ struct Bounds {
 };
 
 /// The box around all primitives over the frames k/fps < duration_s of a clip (at least frame 0;
-/// -1: the rest pose), metres. Errors: kInvalid where a posed position is not
-/// finite (names it), or for a frame rate that is not positive.
+/// -1: the rest pose), metres. Errors: kInvalid where a posed position is not finite (names it), or
+/// for a frame rate that is not positive.
 [[nodiscard]] Result<Bounds> clip_bounds(const Scene& scene, int clip, double fps);
 
 }  // namespace relit::bake

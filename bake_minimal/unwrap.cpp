@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
+#include <numeric>
 #include <optional>
 #include <queue>
 #include <tuple>
@@ -18,6 +20,14 @@ namespace {
 constexpr double kExpectedFill = 0.65;
 // Triangles that may be laid flat in trial unions, over those of the surface: bounds the time.
 constexpr std::size_t kMergeEffort = 20;
+constexpr double kOverlapFineness = 8;  // of the check within a chart, over the baked texels
+constexpr int kTrialGrid = 128;
+constexpr std::size_t kGreatestTrimmed = 64;
+constexpr int kGreatestCuts = 6;
+constexpr std::size_t kCutCandidates = 5;
+constexpr std::size_t kGreatestPieces = 4;
+constexpr double kLeastGain = 1.04;  // in scale, for one more seam
+constexpr double kGoodFill = 0.72;
 constexpr double kLeastShapeFill = 0.35;  // of the bounding rectangle, after a union
 
 FlattenLimits cut_limits(const Surface& surface, const PackOptions& options) {
@@ -28,6 +38,7 @@ FlattenLimits cut_limits(const Surface& surface, const PackOptions& options) {
   FlattenLimits limits;
   limits.greatest_side = 0.95 * metres_a_texel * std::max(options.width, options.height);
   limits.greatest_short_side = 0.95 * metres_a_texel * std::min(options.width, options.height);
+  limits.overlap_scale = kOverlapFineness / metres_a_texel;
   return limits;
 }
 
@@ -134,6 +145,85 @@ class Merger {
   std::priority_queue<Pair> queue_;
 };
 
+// Cuts large charts through the middle where that lets everything be packed at a clearly larger
+// scale: two squares fill half a square, but a square and two halves nearly all of it. Judged on a
+// coarse grid.
+class Trimmer {
+ public:
+  Trimmer(const Surface& surface, const FlattenLimits& limits, const PackOptions& options)
+      : surface_(surface), limits_(limits), options_(options) {
+    const int larger = std::max(options.width, options.height);
+    options_.greatest_grid = std::min(larger, kTrialGrid);
+  }
+
+  void run(std::vector<FlatChart>& charts) const {
+    if (charts.size() > kGreatestTrimmed) return;
+    double scale = 0;
+    for (int cuts = 0; cuts < kGreatestCuts; ++cuts) {
+      const auto packed = pack_shapes(shapes_of(charts), options_);
+      if (!packed) return;
+      scale = std::max(packed->scale, scale);
+      if (fill(charts, scale) > kGoodFill || !cut_one(charts, scale * kLeastGain)) return;
+      scale *= kLeastGain;
+    }
+  }
+
+ private:
+  static std::vector<PackShape> shapes_of(const std::vector<FlatChart>& charts) {
+    std::vector<PackShape> shapes;
+    for (const FlatChart& c : charts) shapes.push_back(to_shape(c));
+    return shapes;
+  }
+
+  double fill(const std::vector<FlatChart>& charts, double scale) const {
+    double area = 0;
+    for (const FlatChart& c : charts) area += c.area;
+    return area * scale * scale / (static_cast<double>(options_.width) * options_.height);
+  }
+
+  bool cut_one(std::vector<FlatChart>& charts, double scale) const {
+    std::vector<std::size_t> order(charts.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+      return charts[a].size.x > charts[b].size.x;
+    });
+    order.resize(std::min<std::size_t>(order.size(), kCutCandidates));
+    for (const std::size_t c : order) {
+      std::vector<FlatChart> pieces = halves(charts[c]);
+      if (pieces.size() < 2 || pieces.size() > kGreatestPieces) continue;
+      std::vector<FlatChart> trial = charts;
+      trial[c] = std::move(pieces.back());
+      pieces.pop_back();
+      std::move(pieces.begin(), pieces.end(), std::back_inserter(trial));
+      if (!shapes_fit(shapes_of(trial), options_, scale)) continue;
+      charts = std::move(trial);
+      return true;
+    }
+    return false;
+  }
+
+  std::vector<FlatChart> halves(const FlatChart& chart) const {
+    std::array<std::vector<std::uint32_t>, 2> sides;
+    for (std::size_t i = 0; i < chart.triangles.size(); ++i) {
+      double x = 0;
+      for (std::size_t k = 0; k < 3; ++k) x += chart.uv[chart.corners[3 * i + k]].x;
+      sides[x < 1.5 * chart.size.x ? 0 : 1].push_back(chart.triangles[i]);
+    }
+    std::vector<FlatChart> pieces;
+    if (sides[0].empty() || sides[1].empty()) return pieces;
+    for (const auto& side : sides) {
+      for (auto& part : connected_parts(surface_, side)) {
+        flatten_pieces(surface_, std::move(part), limits_, pieces);
+      }
+    }
+    return pieces;
+  }
+
+  const Surface& surface_;
+  const FlattenLimits& limits_;
+  PackOptions options_;
+};
+
 // Charts with a texel that two of their own triangles own, at the baked size.
 std::vector<bool> self_overlapping(std::span<const FlatChart> charts, std::span<const glm::vec2> uv,
                                    const PackOptions& options) {
@@ -226,7 +316,10 @@ std::vector<FlatChart> make_charts(const Surface& surface, const PackOptions& op
   for (auto& patch : grow_patches(surface)) {
     flatten_pieces(surface, std::move(patch), limits, charts);
   }
-  return Merger(surface, std::move(charts), union_limits(limits)).run();
+  const FlattenLimits tighter = union_limits(limits);
+  charts = Merger(surface, std::move(charts), tighter).run();
+  Trimmer(surface, limits, options).run(charts);
+  return charts;
 }
 
 PackShape to_shape(const FlatChart& chart) {

@@ -286,4 +286,29 @@ std::vector<std::vector<std::uint32_t>> split_patch(const Surface& surface,
   return parts;
 }
 
+std::vector<std::vector<std::uint32_t>> connected_parts(const Surface& surface,
+                                                        std::span<const std::uint32_t> patch) {
+  const LocalGraph graph = local_graph(surface, patch);
+  std::vector<bool> seen(patch.size(), false);
+  std::vector<std::vector<std::uint32_t>> parts;
+  for (std::uint32_t first = 0; first < patch.size(); ++first) {
+    if (seen[first]) continue;
+    std::vector<std::uint32_t>& part = parts.emplace_back();
+    std::vector<std::uint32_t> stack{first};
+    seen[first] = true;
+    while (!stack.empty()) {
+      const std::uint32_t i = stack.back();
+      stack.pop_back();
+      part.push_back(patch[i]);
+      for (const std::uint32_t n : graph[i]) {
+        if (n == kNoTriangle || seen[n]) continue;
+        seen[n] = true;
+        stack.push_back(n);
+      }
+    }
+    std::sort(part.begin(), part.end());
+  }
+  return parts;
+}
+
 }  // namespace relit::bake

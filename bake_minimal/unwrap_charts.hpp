@@ -22,4 +22,8 @@ namespace relit::bake {
 [[nodiscard]] std::vector<std::vector<std::uint32_t>> split_patch(
     const Surface& surface, std::span<const std::uint32_t> patch);
 
+/// The parts of a patch that hang together over edges.
+[[nodiscard]] std::vector<std::vector<std::uint32_t>> connected_parts(
+    const Surface& surface, std::span<const std::uint32_t> patch);
+
 }  // namespace relit::bake

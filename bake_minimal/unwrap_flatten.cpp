@@ -18,7 +18,8 @@ constexpr double kPi = 3.14159265358979323846;
 // flat image keeps to the limits.
 constexpr double kGreatestCurvature = 5.0;
 constexpr int kRigidSteps = 12;
-constexpr int kOverlapSide = 512;
+constexpr int kLeastOverlapSide = 32;
+constexpr int kGreatestOverlapSide = 512;
 
 double cross2(const glm::dvec2& a, const glm::dvec2& b) { return a.x * b.y - a.y * b.x; }
 
@@ -291,21 +292,27 @@ class Flattener {
     return q > r ? (q + r) / (q - r) : std::numeric_limits<double>::infinity();
   }
 
-  // Texels owned twice, by the exact rasteriser, at a size well beyond what will be baked.
+  // Texels owned twice, by the exact rasteriser.
   bool overlaps() const {
-    const double scale = (kOverlapSide - 2) / std::max(chart_.size.x, chart_.size.y);
+    const double longest = std::max(chart_.size.x, chart_.size.y);
+    const double wanted =
+        limits_.overlap_scale > 0 ? limits_.overlap_scale * longest : double{kGreatestOverlapSide};
+    const int side = static_cast<int>(
+        std::clamp(wanted, double{kLeastOverlapSide}, double{kGreatestOverlapSide}));
+    const double scale = (side - 2) / longest;
     std::vector<glm::vec2> uv;
     uv.reserve(chart_.uv.size());
-    for (const glm::dvec2& p : chart_.uv) uv.emplace_back((p * scale + 1.0) / double{kOverlapSide});
-    std::vector<bool> taken(static_cast<std::size_t>(kOverlapSide) * kOverlapSide, false);
-    bool twice = false;
+    for (const glm::dvec2& p : chart_.uv) uv.emplace_back((p * scale + 1.0) / double(side));
+    std::vector<std::uint8_t> taken(static_cast<std::size_t>(side) *
+                                    static_cast<std::size_t>(side));
     for (const auto& tri : mesh_.triangles) {
-      FixedTriangle(uv[tri[0]], uv[tri[1]], uv[tri[2]], kOverlapSide, kOverlapSide)
-          .for_each_row(kOverlapSide, kOverlapSide, [&](int y, int x0, int x1) {
+      bool twice = false;
+      FixedTriangle(uv[tri[0]], uv[tri[1]], uv[tri[2]], side, side)
+          .for_each_row(side, side, [&](int y, int x0, int x1) {
             for (int x = x0; x <= x1; ++x) {
-              auto cell = taken[static_cast<std::size_t>(y * kOverlapSide + x)];
-              twice = twice || cell;
-              cell = true;
+              std::uint8_t& cell = taken[static_cast<std::size_t>(y * side + x)];
+              twice = twice || cell != 0;
+              cell = 1;
             }
           });
       if (twice) return true;

@@ -33,6 +33,7 @@ struct FlattenLimits {
   double greatest_side = 0;          ///< of the bounding rectangle; 0: any. Never less than the
   double greatest_short_side = 0;    ///< patch's longest edge, which no cut makes shorter
   double least_fill = 0;             ///< of the bounding rectangle by the chart
+  double overlap_scale = 0;  ///< texels a unit at which overlap is looked for; 0: 512 a side
 };
 
 /// Lays a connected patch flat: as it is where it is plane, else by a least squares conformal map

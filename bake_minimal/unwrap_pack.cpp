@@ -5,78 +5,37 @@
 #include <cmath>
 #include <numeric>
 #include <optional>
+#include <set>
 
-#include "bake_minimal/texel_raster.hpp"
+#include "bake_minimal/unwrap_footprint.hpp"
 
 namespace relit::bake {
 namespace {
 
-constexpr int kGreatestGrid = 512;       // cells a side; larger atlases are packed in coarser cells
 constexpr double kLeastThickness = 0.5;  // texels
 constexpr std::size_t kGreatestNested = 3000;
 constexpr int kSearchSteps = 10;
+constexpr double kScaleTolerance = 1.004;
+constexpr std::size_t kFewShapes = 16;
+constexpr double kPi = 3.14159265358979323846;
 constexpr double kOpen = 1e-6;
-
-struct Run {
-  std::int16_t row, first, last;
-};
 
 // The cells of a shape at its place in the corner of the grid: those it covers, which keep the
 // gutter, and those that bilinear fetches inside it read, which nobody else may read.
 struct Footprint {
-  std::vector<Run> covered;
-  std::vector<Run> read;
+  std::vector<CellRun> covered;
+  std::vector<CellRun> read;
   glm::ivec2 size{0};
 };
 
+// `covered` and `read` have their longest runs first: those find no room, and skip most then.
 struct Placed {
   std::vector<glm::dvec2> points;  // in cells, from the grid's corner
   Footprint footprint;
 };
 
-class Mask {
- public:
-  explicit Mask(glm::ivec2 size)
-      : size_(size), bits_(static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y)) {}
-
-  // Marks the cells whose centre is within `reach` of the triangle on both axes.
-  void add(const std::array<glm::dvec2, 3>& p, double reach) {
-    const double lo = std::min({p[0].y, p[1].y, p[2].y});
-    const double hi = std::max({p[0].y, p[1].y, p[2].y});
-    const int y0 = std::max(0, static_cast<int>(std::ceil(lo - reach - 0.5)));
-    const int y1 = std::min(size_.y - 1, static_cast<int>(std::floor(hi + reach - 0.5)));
-    for (int y = y0; y <= y1; ++y) {
-      const SlabExtent e = slab_extent(p, y + 0.5 - reach, y + 0.5 + reach);
-      const int x0 = std::max(0, static_cast<int>(std::ceil(e.lo - reach - 0.5)));
-      const int x1 = std::min(size_.x - 1, static_cast<int>(std::floor(e.hi + reach - 0.5)));
-      const auto row = static_cast<std::size_t>(y) * static_cast<std::size_t>(size_.x);
-      for (int x = x0; x <= x1; ++x) bits_[row + static_cast<std::size_t>(x)] = 1;
-    }
-  }
-
-  std::vector<Run> runs() const {
-    std::vector<Run> out;
-    for (int y = 0; y < size_.y; ++y) {
-      const std::uint8_t* row =
-          bits_.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(size_.x);
-      for (int x = 0; x < size_.x;) {
-        if (row[x] == 0) {
-          ++x;
-          continue;
-        }
-        const int first = x;
-        while (x < size_.x && row[x] != 0) ++x;
-        out.push_back({static_cast<std::int16_t>(y), static_cast<std::int16_t>(first),
-                       static_cast<std::int16_t>(x - 1)});
-      }
-    }
-    return out;
-  }
-
- private:
-  glm::ivec2 size_;
-  std::vector<std::uint8_t> bits_;
-};
+// One shape at every turn that is tried; nothing where it is too large for the atlas.
+using Candidates = std::vector<std::optional<Placed>>;
 
 // Occupied cells; knows for every cell the nearest occupied one at or before it in its row, so that
 // a run is tested, and the place beyond an obstacle found, in one look.
@@ -84,9 +43,22 @@ class Grid {
  public:
   explicit Grid(glm::ivec2 size)
       : size_(size),
-        last_(static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y), -1) {}
+        last_(static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y), -1),
+        gap_(static_cast<std::size_t>(size.y), size.x) {}
 
   std::int16_t last_occupied(int x, int y) const { return row(y)[x]; }
+
+  // Whether row y may have room for a run so long; as of the last note_gaps().
+  bool may_hold(int y, int length) const { return gap_[static_cast<std::size_t>(y)] >= length; }
+
+  void note_gaps(int y0, int y1) {
+    for (int y = std::max(y0, 0); y <= std::min(y1, size_.y - 1); ++y) {
+      const std::int16_t* r = row(y);
+      int longest = 0;
+      for (int x = 0; x < size_.x; ++x) longest = std::max(longest, x - r[x]);
+      gap_[static_cast<std::size_t>(y)] = longest;
+    }
+  }
 
   void occupy(int y, int x0, int x1) {
     if (y < 0 || y >= size_.y) return;
@@ -107,13 +79,14 @@ class Grid {
 
   glm::ivec2 size_;
   std::vector<std::int16_t> last_;
+  std::vector<int> gap_;
 };
 
 // The first x from `x` on at which no run meets an occupied cell, as far as this pass saw; equal to
 // x when none does.
-int next_free(const Grid& grid, const std::vector<Run>& runs, int x, int y) {
+int next_free(const Grid& grid, const std::vector<CellRun>& runs, int x, int y) {
   int next = x;
-  for (const Run& run : runs) {
+  for (const CellRun& run : runs) {
     const int hit = grid.last_occupied(next + run.last, y + run.row);
     if (hit >= next + run.first) return hit - run.first + 1;
   }
@@ -127,14 +100,28 @@ class Packer {
   Packer(std::span<const PackShape> shapes, const PackOptions& options)
       : shapes_(shapes), options_(options) {
     const int larger = std::max(options.width, options.height);
-    while (larger > kGreatestGrid * unit_) unit_ *= 2;
+    while (larger > options.greatest_grid * unit_) unit_ *= 2;
     grid_size_ = {options.width / unit_, options.height / unit_};
     // A coarse cell counts as covered when it is touched; one empty cell then keeps fetches apart.
     gutter_ = unit_ == 1 ? options.gutter : std::max(1, (options.gutter + unit_ - 1) / unit_);
     covered_reach_ = unit_ == 1 ? 1.0 / 128 : 0.5;
     read_reach_ = (unit_ == 1 ? 1.0 : 0.5) - kOpen;
     inset_ = 0.5 / unit_;
+    // Quarter turns first: between equals they keep straight borders on the grid.
+    turns_ = {{1, 0}, {0, 1}, {-1, 0}, {0, -1}};
+    const int finer = options.quarter_turns_only        ? 1
+                      : shapes.size() <= kFewShapes     ? 4
+                      : shapes.size() <= 4 * kFewShapes ? 2
+                                                        : 1;
+    for (int k = 1; k < finer; ++k) {
+      const double angle = kPi / 2 * k / finer;
+      for (int quarter = 0; quarter < 4; ++quarter) {
+        const double a = angle + quarter * kPi / 2;
+        turns_.emplace_back(std::cos(a), std::sin(a));
+      }
+    }
     for (const PackShape& s : shapes_) {
+      outlines_.push_back(find_outline(s.points, s.triangles));
       for (const auto& t : s.triangles) {
         area_ += std::abs(cross2(s.points[t[1]] - s.points[t[0]], s.points[t[2]] - s.points[t[0]]));
       }
@@ -170,6 +157,8 @@ class Packer {
     return result;
   }
 
+  bool fits(double scale) const { return try_nested(scale / unit_).has_value(); }
+
  private:
   template <class Try>
   void search(double& good, double& bad, std::optional<std::vector<Placed>>& best, Try attempt) {
@@ -184,7 +173,7 @@ class Packer {
       }
     }
     if (good == 0) return;
-    for (int step = 0; step < kSearchSteps && bad > good * 1.002; ++step) {
+    for (int step = 0; step < kSearchSteps && bad > good * kScaleTolerance; ++step) {
       const double s = (good + bad) / 2;
       if (auto placed = attempt(s)) {
         best = std::move(placed);
@@ -195,16 +184,14 @@ class Packer {
     }
   }
 
-  // The shape at a scale, after quarter turns, from the inset on, with a texel centre inside.
-  std::vector<glm::dvec2> transformed(const PackShape& shape, double scale, int quarter) const {
+  // The shape at a scale, turned, from the inset on, with a texel centre inside.
+  std::vector<glm::dvec2> transformed(const PackShape& shape, double scale,
+                                      const glm::dvec2& turn) const {
     std::vector<glm::dvec2> out;
     out.reserve(shape.points.size());
     for (const glm::dvec2& p : shape.points) {
-      const glm::dvec2 q = p * scale;
-      out.push_back(quarter == 0   ? q
-                    : quarter == 1 ? glm::dvec2(-q.y, q.x)
-                    : quarter == 2 ? -q
-                                   : glm::dvec2(q.y, -q.x));
+      out.emplace_back(scale * (p.x * turn.x - p.y * turn.y),
+                       scale * (p.x * turn.y + p.y * turn.x));
     }
     glm::dvec2 lo, hi;
     bounds(out, lo, hi);
@@ -252,7 +239,7 @@ class Packer {
     std::vector<Placed> placed(shapes_.size());
     std::vector<glm::ivec2> sizes(shapes_.size()), at(shapes_.size());
     for (std::size_t i = 0; i < shapes_.size(); ++i) {
-      placed[i].points = transformed(shapes_[i], scale, 0);
+      placed[i].points = transformed(shapes_[i], scale, turns_.front());
       glm::dvec2 lo, hi;
       bounds(placed[i].points, lo, hi);
       if (hi.x > grid_size_.x - inset_ || hi.y > grid_size_.y - inset_) return std::nullopt;
@@ -272,9 +259,9 @@ class Packer {
     return placed;
   }
 
-  std::optional<Placed> footprint(const PackShape& shape, double scale, int quarter) const {
+  std::optional<Placed> footprint(std::size_t i, double scale, const glm::dvec2& turn) const {
     Placed out;
-    out.points = transformed(shape, scale, quarter);
+    out.points = transformed(shapes_[i], scale, turn);
     glm::dvec2 lo, hi;
     bounds(out.points, lo, hi);
     if (hi.x > grid_size_.x - inset_ || hi.y > grid_size_.y - inset_) return std::nullopt;
@@ -282,14 +269,8 @@ class Packer {
     const glm::ivec2 size = glm::min(
         glm::ivec2(static_cast<int>(std::floor(hi.x)), static_cast<int>(std::floor(hi.y))) + 2,
         grid_size_);
-    Mask covered(size), read(size);
-    for (const auto& t : shape.triangles) {
-      const std::array<glm::dvec2, 3> p{out.points[t[0]], out.points[t[1]], out.points[t[2]]};
-      covered.add(p, covered_reach_);
-      read.add(p, read_reach_);
-    }
-    out.footprint.covered = covered.runs();
-    out.footprint.read = read.runs();
+    out.footprint.covered = find_cells(out.points, outlines_[i], covered_reach_, size);
+    out.footprint.read = find_cells(out.points, outlines_[i], read_reach_, size);
     // May be moved as long as its points keep the inset.
     out.footprint.size = {static_cast<int>(std::ceil(hi.x + inset_ - kOpen)),
                           static_cast<int>(std::ceil(hi.y + inset_ - kOpen))};
@@ -298,15 +279,14 @@ class Packer {
 
   std::optional<std::vector<Placed>> try_nested(double scale) const {
     const std::size_t count = shapes_.size();
-    std::vector<std::array<std::optional<Placed>, 4>> turned(count);
+    std::vector<Candidates> turned(count);
     std::vector<std::size_t> cells(count, 0);
     for (std::size_t i = 0; i < count; ++i) {
-      for (int quarter = 0; quarter < 4; ++quarter) {
-        turned[i][static_cast<std::size_t>(quarter)] = footprint(shapes_[i], scale, quarter);
-      }
-      const auto& any = turned[i][0] ? turned[i][0] : turned[i][1];
-      if (!any) return std::nullopt;
-      const glm::ivec2 size = any->footprint.size;
+      for (const glm::dvec2& turn : turns_) turned[i].push_back(footprint(i, scale, turn));
+      const auto any = std::find_if(turned[i].begin(), turned[i].end(),
+                                    [](const auto& candidate) { return candidate.has_value(); });
+      if (any == turned[i].end()) return std::nullopt;
+      const glm::ivec2 size = (*any)->footprint.size;
       cells[i] = static_cast<std::size_t>(std::max(size.x, size.y)) *
                  static_cast<std::size_t>(size.x + size.y);
     }
@@ -325,32 +305,40 @@ class Packer {
 
   // Covered cells of two shapes are more than a gutter apart, so they stay disjoint when each grows
   // by the gutter to the right and upwards: their sum is a cheap bound.
-  bool room_for(const std::vector<std::array<std::optional<Placed>, 4>>& turned) const {
+  bool room_for(const std::vector<Candidates>& turned) const {
     std::int64_t cells = 0;
-    for (const auto& shape : turned) {
-      const std::vector<Run>& runs = (shape[0] ? shape[0] : shape[1])->footprint.covered;
-      int longest = 0, row = -1;
-      for (const Run& r : runs) {
-        const int length = r.last - r.first + 1;
-        cells += length + (r.row != row ? gutter_ : 0);
-        row = r.row;
-        longest = std::max(longest, length);
+    for (const Candidates& shape : turned) {
+      std::int64_t least = std::numeric_limits<std::int64_t>::max();
+      for (const auto& candidate : shape) {
+        if (candidate) least = std::min(least, grown_cells(candidate->footprint.covered));
       }
-      cells += std::int64_t{gutter_} * (longest + gutter_);
+      cells += least;
     }
     return cells <= std::int64_t{grid_size_.x + gutter_} * (grid_size_.y + gutter_);
   }
 
-  // The lowest place, then the leftmost, over the four turns.
-  bool place(std::array<std::optional<Placed>, 4>& turned, Grid& covered, Grid& read,
-             Placed& out) const {
+  std::int64_t grown_cells(const std::vector<CellRun>& runs) const {
+    std::int64_t cells = 0;
+    std::set<int> rows;
+    for (const CellRun& r : runs) {
+      cells += r.last - r.first + 1;
+      rows.insert(r.row);
+    }
+    const std::int64_t longest = runs.front().last - runs.front().first + 1;
+    return cells + gutter_ * (static_cast<std::int64_t>(rows.size()) + longest + gutter_);
+  }
+
+  // The lowest place, then the leftmost, over all turns.
+  bool place(Candidates& turned, Grid& covered, Grid& read, Placed& out) const {
     int best_top = std::numeric_limits<int>::max();
     glm::ivec2 best_at(0);
     std::optional<Placed>* best = nullptr;
     for (auto& candidate : turned) {
       if (!candidate) continue;
       const Footprint& f = candidate->footprint;
+      const CellRun longest = f.covered.front();
       for (int y = 0; y + f.size.y <= grid_size_.y && y + f.size.y <= best_top; ++y) {
+        if (!covered.may_hold(y + longest.row, longest.last - longest.first + 1)) continue;
         const int x = first_free(f, covered, read, y);
         if (x < 0) continue;
         if (y + f.size.y < best_top || x < best_at.x) {
@@ -363,15 +351,16 @@ class Packer {
     }
     if (best == nullptr) return false;
     out = *std::move(*best);
-    for (const Run& r : out.footprint.covered) {
+    for (const CellRun& r : out.footprint.covered) {
       for (int dy = -gutter_; dy <= gutter_; ++dy) {
         covered.occupy(best_at.y + r.row + dy, best_at.x + r.first - gutter_,
                        best_at.x + r.last + gutter_);
       }
     }
-    for (const Run& r : out.footprint.read) {
+    for (const CellRun& r : out.footprint.read) {
       read.occupy(best_at.y + r.row, best_at.x + r.first, best_at.x + r.last);
     }
+    covered.note_gaps(best_at.y - gutter_, best_at.y + out.footprint.size.y + gutter_);
     for (glm::dvec2& q : out.points) q += glm::dvec2(best_at);
     return true;
   }
@@ -395,7 +384,9 @@ class Packer {
   const PackOptions& options_;
   int unit_ = 1;  // texels a cell
   glm::ivec2 grid_size_{0};
-  int gutter_ = 2;  // cells
+  std::vector<std::vector<OutlineEdge>> outlines_;  // by shape
+  std::vector<glm::dvec2> turns_;                   // cosine and sine
+  int gutter_ = 2;                                  // cells
   double covered_reach_ = 0, read_reach_ = 0, inset_ = 0;
   double area_ = 0;
 };
@@ -405,6 +396,10 @@ class Packer {
 Result<PackResult> pack_shapes(std::span<const PackShape> shapes, const PackOptions& options) {
   if (shapes.empty()) return PackResult{1.0, {}};
   return Packer(shapes, options).run();
+}
+
+bool shapes_fit(std::span<const PackShape> shapes, const PackOptions& options, double scale) {
+  return Packer(shapes, options).fits(scale);
 }
 
 }  // namespace relit::bake

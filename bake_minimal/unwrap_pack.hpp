@@ -21,7 +21,9 @@ struct PackShape {
 struct PackOptions {
   int width = 128;  ///< texels
   int height = 128;
-  int gutter = 2;  ///< empty texels between texels covered by different shapes, at least
+  int gutter = 2;           ///< empty texels between texels covered by different shapes, at least
+  int greatest_grid = 512;  ///< cells a side; larger atlases are packed in coarser cells
+  bool quarter_turns_only = false;  ///< else few shapes are tried at finer angles too
 };
 
 struct PackResult {
@@ -38,6 +40,10 @@ struct PackResult {
 /// Errors: kLimit when there are more shapes than the size has room for.
 [[nodiscard]] Result<PackResult> pack_shapes(std::span<const PackShape> shapes,
                                              const PackOptions& options);
+
+/// Whether shapes fit at a scale (texels per unit), as the search above would try it.
+[[nodiscard]] bool shapes_fit(std::span<const PackShape> shapes, const PackOptions& options,
+                              double scale);
 
 /// Rectangles in whole cells. False when they do not all fit; `at` are their lower corners.
 [[nodiscard]] bool pack_rectangles(std::span<const glm::ivec2> sizes, glm::ivec2 atlas,

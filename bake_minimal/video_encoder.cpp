@@ -97,8 +97,8 @@ void configure_x265(const VideoSettings& s, Options& options) {
       std::to_string(s.segment_frames) + ":min-keyint=1:ref=" + std::to_string(s.reference_frames);
   // Pictures smaller than a coding tree unit are refused.
   if (std::min(s.width, s.height) < 64) p += ":ctu=16";
-  // x265 3.5 writes its tree of costs eight blocks of 16 at a time, beyond the end of the heap block
-  // where a row has another number.
+  // x265 3.5 writes its tree of costs eight blocks of 16 at a time, beyond the end of the heap
+  // block where a row has another number.
   if (s.width % 128 != 0) p += ":cutree=0";
   p += s.lossless ? ":lossless=1" : ":crf=" + number(s.crf);
   options.set("x265-params", p);
@@ -268,6 +268,7 @@ SampleTarget VideoEncoder::target(int component) {
 Status VideoEncoder::encode(std::int64_t pts, bool first_of_segment,
                             std::vector<CodedPacket>& out) {
   picture_->pts = pts;
+  picture_->quality = context_->global_quality;
   picture_->pict_type = first_of_segment ? AV_PICTURE_TYPE_I : AV_PICTURE_TYPE_NONE;
   const int error = avcodec_send_frame(context_.get(), picture_.get());
   if (error < 0) {

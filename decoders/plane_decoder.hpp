@@ -68,22 +68,25 @@ class TrackDecoder {
   };
   using Chunks = std::map<std::uint64_t, Chunk>;  ///< by first frame
 
-  explicit TrackDecoder(VideoDecoder decoder) : decoder_(std::move(decoder)) {}
+  TrackDecoder(VideoDecoder decoder, std::uint32_t track_id, int threads)
+      : decoder_(std::move(decoder)), track_id_(track_id), threads_(threads) {}
   [[nodiscard]] Chunks::const_iterator find(std::uint64_t frame) const;
   void restart(std::uint64_t first_frame);
   /// Makes `ahead_` the next picture of the chunk; leaves it empty at the end.
   void advance(const Chunk& chunk);
   void feed(const Chunk& chunk);
-  void note_damage(Error error);
+  void note_damage(const Chunk& chunk, Error error);
 
   VideoDecoder decoder_;
-  std::uint32_t track_id_ = 0;
+  std::uint32_t track_id_;
+  int threads_;
   Chunks chunks_;
   std::optional<std::uint64_t> segment_;  ///< first frame of the chunk in the decoder
   std::size_t next_packet_ = 0;
   bool drained_ = false;
   bool skipping_ = false;  ///< after damage, until a key packet
   std::optional<Error> damage_;
+  std::vector<std::int64_t> suspects_;  ///< pts of the packets that damage may have hit
   VideoFrame current_;
   VideoFrame ahead_;
 };

@@ -10,9 +10,7 @@ namespace relit::decoders {
 
 Result<TrackDecoder> TrackDecoder::open(const VideoFormat& format, int threads) {
   RELIT_ASSIGN(VideoDecoder video, VideoDecoder::open(format, threads));
-  TrackDecoder decoder(std::move(video));
-  decoder.track_id_ = format.track_id;
-  return decoder;
+  return TrackDecoder(std::move(video), format.track_id, threads);
 }
 
 Status TrackDecoder::add_chunk(const container::SegmentRecord& segment,
@@ -64,19 +62,35 @@ bool TrackDecoder::has_segment_of(std::uint64_t frame) const {
 }
 
 void TrackDecoder::restart(std::uint64_t first_frame) {
-  // Every segment is drained to its end or given up, so the decoder always starts at a key packet.
-  if (segment_ || next_packet_ > 0) decoder_.flush();
+  // A segment starts with a decoder that knows nothing of the one before. Damage is gone for
+  // certain only with the decoder that met it.
+  if (!damage_ || !decoder_.reopen()) {
+    if (next_packet_ > 0) decoder_.flush();
+  }
   segment_ = first_frame;
   next_packet_ = 0;
   drained_ = false;
   skipping_ = false;
   damage_.reset();
+  suspects_.clear();
   current_.clear();
   ahead_.clear();
 }
 
-void TrackDecoder::note_damage(Error error) {
+void TrackDecoder::note_damage(const Chunk& chunk, Error error) {
   skipping_ = true;
+  // An error belongs to one of the packets in flight. libavcodec may show the rest of the picture
+  // all the same when it is drained.
+  const std::size_t in_flight =
+      std::min(next_packet_, static_cast<std::size_t>(std::max(threads_, 1)));
+  for (std::size_t i = next_packet_ - in_flight; i < next_packet_; ++i) {
+    suspects_.push_back(chunk.record.packets[i].pts);
+  }
+  // No codec holds pictures back for longer.
+  constexpr std::size_t kLongestDelay = 128;
+  if (suspects_.size() > kLongestDelay) {
+    suspects_.erase(suspects_.begin(), suspects_.end() - kLongestDelay);
+  }
   if (!damage_) damage_ = std::move(error);
 }
 
@@ -86,15 +100,15 @@ void TrackDecoder::feed(const Chunk& chunk) {
   // and the pictures that they would have shown are reported as lost.
   while (next_packet_ < packets.size() && skipping_ && !packets[next_packet_].key) ++next_packet_;
   if (next_packet_ == packets.size()) {
-    if (Status drained = decoder_.drain(); !drained) note_damage(std::move(drained).error());
+    if (Status drained = decoder_.drain(); !drained) note_damage(chunk, std::move(drained).error());
     drained_ = true;
     return;
   }
   const container::Packet& packet = packets[next_packet_++];
   if (next_packet_ == 1 && !packet.key) {
-    note_damage({ErrorCode::kCorrupt, "track " + std::to_string(track_id_) + ", frame " +
-                                          std::to_string(packet.pts) +
-                                          ": the segment does not begin with a key packet"});
+    note_damage(chunk, {ErrorCode::kCorrupt, "track " + std::to_string(track_id_) + ", frame " +
+                                                 std::to_string(packet.pts) +
+                                                 ": the segment does not begin with a key packet"});
     return;
   }
   skipping_ = false;
@@ -102,7 +116,7 @@ void TrackDecoder::feed(const Chunk& chunk) {
       std::span(chunk.record.data)
           .subspan(static_cast<std::size_t>(packet.offset), static_cast<std::size_t>(packet.size));
   if (Status sent = decoder_.send(bytes, packet.pts, packet.key); !sent) {
-    note_damage(std::move(sent).error());
+    note_damage(chunk, std::move(sent).error());
   }
 }
 
@@ -114,18 +128,23 @@ void TrackDecoder::advance(const Chunk& chunk) {
     Result<VideoDecoder::Received> received = decoder_.receive(ahead_);
     if (!received) {
       ++failures;
-      note_damage(std::move(received).error());
+      note_damage(chunk, std::move(received).error());
       continue;
     }
     if (*received == VideoDecoder::Received::kFrame) {
+      const std::int64_t pts = ahead_.pts();
       const std::int64_t after = current_.empty() ? -1 : current_.pts();
-      const bool known = std::binary_search(chunk.shown.begin(), chunk.shown.end(), ahead_.pts());
-      if (known && ahead_.pts() > after) return;
-      note_damage(
-          {ErrorCode::kCorrupt, "track " + std::to_string(track_id_) +
-                                    ": a picture with the time stamp of none of the packets, "
-                                    "or out of order, after frame " +
-                                    std::to_string(after)});
+      if (std::find(suspects_.begin(), suspects_.end(), pts) != suspects_.end()) {
+        ahead_.clear();
+        continue;
+      }
+      const bool known = std::binary_search(chunk.shown.begin(), chunk.shown.end(), pts);
+      if (known && pts > after) return;
+      note_damage(chunk, {ErrorCode::kCorrupt,
+                          "track " + std::to_string(track_id_) +
+                              ": a picture with the time stamp of none of the packets, "
+                              "or out of order, after frame " +
+                              std::to_string(after)});
       ahead_.clear();
       continue;
     }

@@ -3,6 +3,7 @@
 
 extern "C" {
 #include <libavcodec/avcodec.h>
+#include <libavutil/crc.h>
 #include <libavutil/frame.h>
 #include <libavutil/pixdesc.h>
 }
@@ -85,10 +86,9 @@ Status check_format(const VideoFormat& format) {
   }
   // FFmpeg 5.1 breaks its own heap with FFV1 pictures of a few samples.
   if (format.codec == "ffv1" && std::min(format.width, format.height) < 16) {
-    return fail(ErrorCode::kUnsupported, track_name(format) + ": FFV1 pictures of " +
-                                             std::to_string(format.width) + "x" +
-                                             std::to_string(format.height) +
-                                             ", at least 16x16 is needed");
+    return fail(ErrorCode::kUnsupported,
+                track_name(format) + ": FFV1 pictures of " + std::to_string(format.width) + "x" +
+                    std::to_string(format.height) + ", at least 16x16 is needed");
   }
   if (format.bit_depth != 8 && format.bit_depth != 10) {
     return fail(ErrorCode::kInvalid, track_name(format) + ": " + std::to_string(format.bit_depth) +
@@ -101,6 +101,25 @@ Status check_format(const VideoFormat& format) {
     return fail(ErrorCode::kLimit, track_name(format) + ": codec_private is too long");
   }
   return {};
+}
+
+/// Walks the slices of an FFV1 packet (RFC 9043, section 4.8) from the last to the first: 24 bits
+/// of size, a status byte and a CRC that makes the whole slice's zero. libavcodec fills a damaged
+/// slice from the picture before, and says so only in its log.
+bool ffv1_intact(std::span<const std::uint8_t> packet) {
+  constexpr std::size_t kFooter = 8;
+  const AVCRC* table = av_crc_get_table(AV_CRC_32_IEEE);
+  while (!packet.empty()) {
+    if (packet.size() < kFooter) return false;
+    const std::uint8_t* f = packet.data() + packet.size() - kFooter;
+    const std::size_t size =
+        ((std::size_t{f[0]} << 16) | (std::size_t{f[1]} << 8) | f[2]) + kFooter;
+    if (size > packet.size()) return false;
+    const auto slice = packet.last(size);
+    if (av_crc(table, 0, slice.data(), slice.size()) != 0) return false;
+    packet = packet.first(packet.size() - size);
+  }
+  return true;
 }
 
 }  // namespace
@@ -185,8 +204,8 @@ Result<VideoDecoder> VideoDecoder::open(const VideoFormat& format, int threads) 
   }
   context.width = format.width;
   context.height = format.height;
-  // Codecs hold more than the picture against this: it is rounded up to their largest block, and the
-  // edge buffer of the MPEG family has 280 rows of any width.
+  // Codecs hold more than the picture against this: it is rounded up to their largest block, and
+  // the edge buffer of the MPEG family has 280 rows of any width.
   context.max_pixels = std::int64_t{((format.width + 127) & ~127) + 256} *
                        std::max((format.height + 127) & ~127, 512);
   context.thread_count = std::clamp(threads, 1, 64);
@@ -205,8 +224,14 @@ Result<VideoDecoder> VideoDecoder::open(const VideoFormat& format, int threads) 
                                          describe(error) + "; its codec_private may be damaged");
   }
   decoder.format_ = format;
-  decoder.format_.codec_private = {};
+  decoder.threads_ = threads;
   return decoder;
+}
+
+Status VideoDecoder::reopen() {
+  RELIT_ASSIGN(VideoDecoder fresh, open(format_, threads_));
+  *this = std::move(fresh);
+  return {};
 }
 
 Status VideoDecoder::send(std::span<const std::uint8_t> packet, std::int64_t pts, bool key) {
@@ -217,6 +242,11 @@ Status VideoDecoder::send(std::span<const std::uint8_t> packet, std::int64_t pts
     return fail(ErrorCode::kLimit, where() + ": a packet of " + std::to_string(packet.size()) +
                                        " bytes, allowed are " +
                                        std::to_string(limits::kRecordBytes));
+  }
+  if (format_.codec == "ffv1" && !ffv1_intact(packet)) {
+    return fail(ErrorCode::kCorrupt, where() +
+                                         ": a slice's CRC is wrong; FFV1 has to be of version 3 "
+                                         "with slice CRCs");
   }
   packet_->data = const_cast<std::uint8_t*>(packet.data());
   packet_->size = static_cast<int>(packet.size());

@@ -5,6 +5,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "container/base/plane_view.hpp"
 #include "container/base/result.hpp"
@@ -21,7 +22,7 @@ namespace relit::decoders {
 /// What a stream claims to be. Every picture is compared with it before anybody sees the picture.
 struct VideoFormat {
   std::string codec;  ///< FFmpeg's name: "h264", "hevc", "mpeg4", "ffv1", "vp9" or "av1"
-  std::span<const std::uint8_t> codec_private;  ///< needed by open() only
+  std::vector<std::uint8_t> codec_private;
   int width = 0;
   int height = 0;
   container::Chroma chroma = container::Chroma::kLuma;
@@ -53,7 +54,8 @@ class VideoFrame {
 };
 
 /// One video stream. Not thread-safe; different decoders may run on different threads.
-/// MPEG-4 always uses the simple IDCT, so that every machine decodes the same samples.
+/// MPEG-4 always uses the simple IDCT, so that every machine decodes the same samples. FFV1 has to
+/// be of version 3 with slice CRCs, which are checked.
 class VideoDecoder {
  public:
   /// Errors: kUnsupported (codec outside the list, or missing from this libavcodec), kLimit,
@@ -66,7 +68,8 @@ class VideoDecoder {
   ~VideoDecoder();
 
   /// Hands over one packet (copied by libavcodec). Call receive() until kAgain first.
-  /// Errors: kCorrupt naming track and pts; the next packet to be sent is then a key packet.
+  /// Errors: kCorrupt naming track and pts; the next packet to be sent is then a key packet,
+  /// after reopen() where pictures inside do not matter.
   Status send(std::span<const std::uint8_t> packet, std::int64_t pts, bool key);
   /// No packets follow until flush(): receive() then yields what is still inside.
   Status drain();
@@ -78,6 +81,9 @@ class VideoDecoder {
 
   /// Forgets all packets and pictures inside; the next packet has to be a key packet.
   void flush();
+  /// Starts afresh with a new libavcodec decoder: after damage, some of them keep more than flush()
+  /// clears. Errors: as open(); the decoder is then as before.
+  Status reopen();
 
  private:
   VideoDecoder() = default;
@@ -89,6 +95,7 @@ class VideoDecoder {
   std::unique_ptr<AVCodecContext, Deleter> context_;
   std::unique_ptr<AVPacket, Deleter> packet_;
   VideoFormat format_;
+  int threads_ = 1;
 };
 
 /// Bytes of one decoded picture of this shape, without libavcodec's padding.

@@ -368,11 +368,13 @@ Status Compositor::read_back(std::span<float> out) {
   StateGuard guard(device_);
   pixels_.resize(4 * texels);
   gl.BindFramebuffer(GL_FRAMEBUFFER, framebuffer_.name());
-  gl.PixelStorei(GL_PACK_ALIGNMENT, 1);
   const bool bytes = storage_.format == LightMapFormat::kSquareRoot8;
-  gl.ReadPixels(0, 0, width_, height_, GL_RGBA, bytes ? GL_UNSIGNED_BYTE : GL_FLOAT,
-                pixels_.data());
-  RELIT_TRY(device_.check("reading a light map back"));
+  if (bytes) {
+    gl.ReadPixels(0, 0, width_, height_, GL_RGBA, GL_UNSIGNED_BYTE, pixels_.data());
+    RELIT_TRY(device_.check("reading a light map back"));
+  } else {
+    RELIT_TRY(read_float_pixels(device_, width_, height_, pixels_));
+  }
   const auto* byte_pixels = reinterpret_cast<const std::uint8_t*>(pixels_.data());
   for (std::size_t i = 0; i < texels; ++i) {
     for (std::size_t c = 0; c < 3; ++c) {

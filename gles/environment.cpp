@@ -73,8 +73,14 @@ std::vector<float> gaussian(float sigma, int limit) {
   return kernel;
 }
 
-// Along the meridians, through the poles, then along the parallels, where an angle takes 1/sin θ as
-// many pixels. Not exactly a Gaussian on the sphere near the poles, but smooth there.
+// sin θ of a row: the size of its pixels on the sphere.
+float row_size(const Equirect& map, int y) {
+  return std::sin(kPi * (static_cast<float>(y) + 0.5f) / static_cast<float>(map.height));
+}
+
+// Along the meridians, through the poles, weighted by the pixels' sizes; then along the parallels,
+// where an angle takes 1/sin θ as many pixels. Not exactly a Gaussian on the sphere near the poles,
+// but smooth there.
 void blur(Equirect& map, float sigma_rad) {
   Equirect vertical = map;
   const std::vector<float> kernel =
@@ -83,14 +89,18 @@ void blur(Equirect& map, float sigma_rad) {
   for (int y = 0; y < map.height; ++y) {
     for (int x = 0; x < map.width; ++x) {
       glm::vec3 sum(0.0f);
-      for (int i = -radius; i <= radius; ++i)
-        sum += kernel[static_cast<std::size_t>(i + radius)] * map.across(x, y + i);
-      vertical.texels[static_cast<std::size_t>(y * map.width + x)] = sum;
+      float weights = 0;
+      for (int i = -radius; i <= radius; ++i) {
+        const float weight =
+            kernel[static_cast<std::size_t>(i + radius)] * std::abs(row_size(map, y + i));
+        sum += weight * map.across(x, y + i);
+        weights += weight;
+      }
+      vertical.texels[static_cast<std::size_t>(y * map.width + x)] = sum / weights;
     }
   }
   for (int y = 0; y < map.height; ++y) {
-    const float row =
-        std::sin(kPi * (static_cast<float>(y) + 0.5f) / static_cast<float>(map.height));
+    const float row = row_size(map, y);
     const std::vector<float> across =
         gaussian(sigma_rad / row / (2 * kPi) * static_cast<float>(map.width), map.width / 2);
     const int reach = static_cast<int>(across.size() / 2);

@@ -44,6 +44,40 @@ std::uint16_t to_half(float value) {
   return static_cast<std::uint16_t>(sign | std::min(half, 0x7BFFu));
 }
 
+float from_half(std::uint16_t half) {
+  const int exponent = (half >> 10) & 31;
+  const auto mantissa = static_cast<float>(half & 1023);
+  const float value =
+      exponent == 0 ? std::ldexp(mantissa, -24) : std::ldexp(mantissa + 1024.0f, exponent - 25);
+  return (half & 0x8000) != 0 ? -value : value;
+}
+
+Status read_float_pixels(const Device& device, int width, int height, std::span<float> rgba) {
+  const Functions& gl = device.gl();
+  GLint format = 0;
+  GLint type = 0;
+  gl.GetIntegerv(GL_IMPLEMENTATION_COLOR_READ_FORMAT, &format);
+  gl.GetIntegerv(GL_IMPLEMENTATION_COLOR_READ_TYPE, &type);
+  gl.PixelStorei(GL_PACK_ALIGNMENT, 1);
+  // EXT_color_buffer_half_float promises floats too, but Mesa's ES 2.0 refuses them.
+  const bool half =
+      !device.is_es3() && format == GL_RGBA && (type == GL_HALF_FLOAT_OES || type == GL_HALF_FLOAT);
+  if (!half) {
+    gl.ReadPixels(0, 0, width, height, GL_RGBA, GL_FLOAT, rgba.data());
+    return device.check("reading float pixels");
+  }
+  gl.ReadPixels(0, 0, width, height, GL_RGBA, static_cast<GLenum>(type), rgba.data());
+  // The halves fill the first part of the buffer; from the end, none is overwritten before it is
+  // read.
+  const auto* halves = reinterpret_cast<const std::uint8_t*>(rgba.data());
+  for (std::size_t i = rgba.size(); i-- > 0;) {
+    std::uint16_t value;
+    std::memcpy(&value, halves + 2 * i, sizeof value);
+    rgba[i] = from_half(value);
+  }
+  return device.check("reading half-float pixels");
+}
+
 Result<LightMapStorage> choose_light_map_storage(const Device& device, LightMapFormat wanted,
                                                  bool render) {
   const Capabilities& caps = device.caps();

@@ -66,4 +66,12 @@ class LightMapUploader {
 /// Rounds to the nearest half float (ties to even). Beyond its range: ±65504. NaN becomes 0.
 [[nodiscard]] std::uint16_t to_half(float value);
 
+/// The value of a half float; infinities and NaN count as ±65536 and more.
+[[nodiscard]] float from_half(std::uint16_t half);
+
+/// Reads RGBA floats from the framebuffer that is bound, bottom row first: 4 × width × height
+/// values. A half-float one may give only half floats (ES 2), which are converted. Errors:
+/// kEnvironment from GL.
+Status read_float_pixels(const Device& device, int width, int height, std::span<float> rgba);
+
 }  // namespace relit::gles

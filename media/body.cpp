@@ -12,49 +12,57 @@
 namespace relit::media {
 namespace {
 
-constexpr double kShoulderBall = 0.050, kElbowBall = 0.036, kWristBall = 0.024;
-constexpr double kHipBall = 0.062, kKneeBall = 0.047, kAnkleBall = 0.034;
-constexpr double kNeckBall = 0.040, kHeadBall = 0.034;
-constexpr double kRim = 50.0 * kDegree;  // half angle of the mouth in which a ball sits
-constexpr double kBack = kPi;            // seams are cut where the camera seldom looks
+constexpr double kBack = kPi;  // seams are cut where the camera seldom looks
+
+// A ball and the half angle of the mouths it sits in: the wider, the less the joint can bend.
+struct Socket {
+  double radius, rim_degrees;
+};
+
+constexpr Socket kShoulder{0.050, 58.0}, kElbow{0.037, 59.0}, kWrist{0.0245, 60.0};
+constexpr Socket kHip{0.069, 57.0}, kKnee{0.048, 54.0}, kAnkle{0.034, 55.0};
+constexpr Socket kNeckLow{0.044, 62.0}, kNeckHigh{0.038, 66.0};
 
 // Two rings of a mouth around a ball at `centre`: one inside the ball, one just outside.
 // `direction` is the way along y from the ball into the part.
-std::array<Ring, 2> mouth(double centre, double ball, double direction) {
-  const double s = exact_sin(kRim), c = exact_cos(kRim);
+std::array<Ring, 2> mouth(double centre, const Socket& socket, double direction) {
+  const double s = exact_sin(socket.rim_degrees * kDegree),
+               c = exact_cos(socket.rim_degrees * kDegree);
   const auto ring = [&](double share) {
-    const double r = share * ball * s;
-    return Ring{.y = centre + direction * share * ball * c, .rx = r, .front = r, .back = r};
+    const double r = share * socket.radius * s;
+    return Ring{
+        .y = centre + direction * share * socket.radius * c, .rx = r, .front = r, .back = r};
   };
-  return {ring(0.93), ring(1.09)};
+  return {ring(0.94), ring(1.06)};
 }
 
-// A limb hangs along -y from its ball at the origin; `profile` rows are {below, rx, front, back,
-// cz}.
+// A limb hangs along -y from its ball at the origin.
 struct LimbRow {
   double below, rx, front, back, cz;
 };
 
-std::vector<Ring> limb_rings(double ball, const std::vector<LimbRow>& profile, double next_ball,
-                             double length) {
-  const auto head = mouth(0.0, ball, -1.0);
+LimbRow round_row(double below, double radius) { return {below, radius, radius, radius, 0.0}; }
+
+std::vector<Ring> limb_rings(const Socket& upper, const std::vector<LimbRow>& profile,
+                             const Socket& lower, double length) {
+  const auto head = mouth(0.0, upper, -1.0), foot = mouth(-length, lower, 1.0);
   std::vector<Ring> rings(head.begin(), head.end());
   for (const LimbRow& r : profile) {
     rings.push_back({.y = -r.below, .rx = r.rx, .front = r.front, .back = r.back, .cz = r.cz});
   }
-  if (next_ball > 0.0) {
-    const auto foot = mouth(-length, next_ball, 1.0);
-    rings.insert(rings.end(), foot.rbegin(), foot.rend());
-  }
+  rings.insert(rings.end(), foot.rbegin(), foot.rend());
   return rings;
 }
 
 const std::vector<LimbRow>& thigh_profile() {
-  static const std::vector<LimbRow> rows{
-      {0.058, 0.0640, 0.065, 0.064, 0.000}, {0.078, 0.0725, 0.074, 0.071, 0.001},
-      {0.115, 0.0770, 0.079, 0.074, 0.003}, {0.170, 0.0745, 0.077, 0.071, 0.004},
-      {0.250, 0.0635, 0.066, 0.061, 0.003}, {0.320, 0.0530, 0.054, 0.052, 0.001},
-      {0.350, 0.0495, 0.050, 0.0495, 0.0},  {0.366, 0.0470, 0.047, 0.047, 0.0}};
+  static const std::vector<LimbRow> rows{{0.049, 0.0660, 0.0665, 0.0655, 0.000},
+                                         {0.070, 0.0725, 0.0740, 0.0715, 0.001},
+                                         {0.110, 0.0765, 0.0790, 0.0740, 0.003},
+                                         {0.165, 0.0745, 0.0775, 0.0710, 0.004},
+                                         {0.245, 0.0635, 0.0660, 0.0610, 0.003},
+                                         {0.315, 0.0530, 0.0540, 0.0520, 0.001},
+                                         round_row(0.350, 0.0490),
+                                         round_row(0.369, 0.0455)};
   return rows;
 }
 
@@ -68,10 +76,13 @@ Surface limb(const char* name, int joint, std::vector<Ring> rings, std::vector<d
   return s;
 }
 
-Surface ball(const char* name, int joint, double radius, double from_degrees, double to_degrees) {
+// Of the ball only what can be seen: from the upper pole (or below it) to under the lip of its own
+// part.
+Surface ball(const char* name, int joint, const Socket& socket, double from_degrees) {
   Surface s{
       .name = name, .joint = joint, .matter = Matter::kWalnut, .columns = 18, .texel_weight = 0.8};
-  s.tolerance_m = 0.0011;
+  const double radius = socket.radius, to_degrees = 187.0 - socket.rim_degrees;
+  s.tolerance_m = 0.0015;
   s.narrowest = 0.45;
   s.point = [=](double t, double angle) {
     const double polar = (from_degrees + (to_degrees - from_degrees) * t) * kDegree;
@@ -132,49 +143,20 @@ Surface foot(const char* name, int joint, double side) {
   return s;
 }
 
-void add_arm(bool left, std::vector<Surface>& out) {
-  const double side = left ? 1.0 : -1.0;
-  const int arm = left ? kUpperArmL : kUpperArmR;
-  out.push_back(ball("shoulder ball", arm, kShoulderBall, 0.0, 136.0));
-  out.push_back(limb("upper arm", arm,
-                     limb_rings(kShoulderBall,
-                                {{0.048, 0.0465, 0.0465, 0.0465, 0.0},
-                                 {0.070, 0.0490, 0.050, 0.048, 0.0},
-                                 {0.110, 0.0465, 0.048, 0.045, 0.001},
-                                 {0.165, 0.0400, 0.041, 0.039, 0.001},
-                                 {0.215, 0.0350, 0.035, 0.035, 0.0},
-                                 {0.242, 0.0345, 0.0345, 0.0345, 0.0},
-                                 {0.254, 0.0330, 0.033, 0.033, 0.0}},
-                                kElbowBall, kBody.upper_arm),
-                     {0.2185}));
-  out.push_back(ball("elbow ball", arm + 1, kElbowBall, 0.0, 136.0));
-  out.push_back(limb("forearm", arm + 1,
-                     limb_rings(kElbowBall,
-                                {{0.034, 0.0335, 0.0335, 0.0335, 0.0},
-                                 {0.052, 0.0370, 0.037, 0.036, 0.0},
-                                 {0.080, 0.0375, 0.038, 0.036, 0.001},
-                                 {0.125, 0.0325, 0.033, 0.031, 0.001},
-                                 {0.170, 0.0260, 0.026, 0.026, 0.0},
-                                 {0.200, 0.0235, 0.0235, 0.0235, 0.0},
-                                 {0.213, 0.0232, 0.0232, 0.0232, 0.0},
-                                 {0.219, 0.0220, 0.022, 0.022, 0.0}},
-                                kWristBall, kBody.forearm),
-                     {0.1905}));
-  out.push_back(ball("wrist ball", arm + 2, kWristBall, 0.0, 136.0));
-  out.back().columns = 14;
-  const auto head = mouth(0.0, kWristBall, -1.0);
+void add_hand(double side, int joint, std::vector<Surface>& out) {
+  const auto head = mouth(0.0, kWrist, -1.0);
   std::vector<Ring> palm(head.begin(), head.end());
   const double in = -side;
-  for (const Ring& r : {Ring{-0.026, 0.0200, 0.0240, 0.0240, in * 0.000, 0.000, 2.1},
-                        Ring{-0.048, 0.0195, 0.0340, 0.0330, in * 0.001, 0.000, 2.3},
-                        Ring{-0.080, 0.0175, 0.0385, 0.0370, in * 0.003, 0.001, 2.4},
-                        Ring{-0.112, 0.0150, 0.0360, 0.0350, in * 0.007, 0.002, 2.4},
-                        Ring{-0.142, 0.0125, 0.0300, 0.0290, in * 0.013, 0.003, 2.3},
-                        Ring{-0.165, 0.0095, 0.0215, 0.0210, in * 0.019, 0.004, 2.2},
-                        Ring{-0.176, 0.0, 0.0, 0.0, in * 0.022, 0.004, 2.0}}) {
+  for (const Ring& r : {Ring{-0.026, 0.0205, 0.0245, 0.0245, in * 0.000, 0.000, 2.1},
+                        Ring{-0.048, 0.0195, 0.0335, 0.0325, in * 0.001, 0.000, 2.3},
+                        Ring{-0.080, 0.0175, 0.0375, 0.0360, in * 0.003, 0.001, 2.4},
+                        Ring{-0.112, 0.0150, 0.0350, 0.0340, in * 0.008, 0.002, 2.4},
+                        Ring{-0.142, 0.0125, 0.0290, 0.0280, in * 0.015, 0.003, 2.3},
+                        Ring{-0.165, 0.0095, 0.0205, 0.0200, in * 0.022, 0.004, 2.2},
+                        Ring{-0.176, 0.0, 0.0, 0.0, in * 0.025, 0.004, 2.0}}) {
     palm.push_back(r);
   }
-  out.push_back(limb("hand", arm + 2, palm, {}));
+  out.push_back(limb("hand", joint, palm, {}));
   const auto thumb = loft({{0.0, 0.0, 0.0, 0.0},
                            {-0.004, 0.0065, 0.0065, 0.0065},
                            {-0.018, 0.0105, 0.0105, 0.0105},
@@ -183,95 +165,129 @@ void add_arm(bool left, std::vector<Surface>& out) {
                            {-0.072, 0.0, 0.0, 0.0}},
                           kBack);
   const glm::dquat turn = turn_about(0, -30.0 * kDegree) * turn_about(2, -side * 14.0 * kDegree);
-  Surface t{.name = "thumb", .joint = arm + 2, .columns = 12};
+  Surface t{.name = "thumb", .joint = joint, .columns = 12};
   t.point = [=](double at, double angle) {
     return turn * thumb(at, angle) + glm::dvec3(in * 0.006, -0.034, 0.022);
   };
   out.push_back(t);
 }
 
+void add_arm(bool left, std::vector<Surface>& out) {
+  const int arm = left ? kUpperArmL : kUpperArmR;
+  out.push_back(ball("shoulder ball", arm, kShoulder, 0.0));
+  out.push_back(limb("upper arm", arm,
+                     limb_rings(kShoulder,
+                                {round_row(0.038, 0.0480),
+                                 {0.060, 0.0500, 0.0505, 0.0495, 0.000},
+                                 {0.095, 0.0485, 0.0500, 0.0470, 0.001},
+                                 {0.150, 0.0415, 0.0430, 0.0400, 0.001},
+                                 {0.205, 0.0350, 0.0350, 0.0350, 0.000},
+                                 round_row(0.236, 0.0340),
+                                 round_row(0.254, 0.0340)},
+                                kElbow, kBody.upper_arm),
+                     {0.2145}));
+  out.push_back(ball("elbow ball", arm + 1, kElbow, 0.0));
+  out.push_back(limb("forearm", arm + 1,
+                     limb_rings(kElbow,
+                                {round_row(0.030, 0.0350),
+                                 {0.048, 0.0370, 0.0370, 0.0365, 0.000},
+                                 {0.078, 0.0370, 0.0375, 0.0360, 0.001},
+                                 {0.122, 0.0320, 0.0325, 0.0310, 0.001},
+                                 {0.168, 0.0255, 0.0255, 0.0255, 0.000},
+                                 round_row(0.198, 0.0232),
+                                 round_row(0.215, 0.0232)},
+                                kWrist, kBody.forearm),
+                     {0.1875}));
+  out.push_back(ball("wrist ball", arm + 2, kWrist, 0.0));
+  out.back().columns = 16;
+  add_hand(left ? 1.0 : -1.0, arm + 2, out);
+}
+
 void add_leg(bool left, std::vector<Surface>& out) {
   const int leg = left ? kThighL : kThighR;
-  out.push_back(ball("hip ball", leg, kHipBall, 45.0, 136.0));
+  out.push_back(ball("hip ball", leg, kHip, 45.0));
   out.push_back(
-      limb("thigh", leg, limb_rings(kHipBall, thigh_profile(), kKneeBall, kBody.thigh), {0.3285}));
-  out.push_back(ball("knee ball", leg + 1, kKneeBall, 0.0, 136.0));
+      limb("thigh", leg, limb_rings(kHip, thigh_profile(), kKnee, kBody.thigh), {0.3285}));
+  out.push_back(ball("knee ball", leg + 1, kKnee, 0.0));
   out.push_back(limb("shin", leg + 1,
-                     limb_rings(kKneeBall,
-                                {{0.043, 0.0450, 0.046, 0.045, 0.000},
-                                 {0.065, 0.0490, 0.048, 0.052, -0.002},
-                                 {0.110, 0.0510, 0.047, 0.059, -0.006},
-                                 {0.165, 0.0475, 0.043, 0.055, -0.007},
-                                 {0.230, 0.0390, 0.037, 0.043, -0.004},
-                                 {0.290, 0.0318, 0.032, 0.033, -0.001},
-                                 {0.330, 0.0305, 0.0305, 0.0305, 0.0},
-                                 {0.350, 0.0312, 0.0312, 0.0312, 0.0},
-                                 {0.359, 0.0300, 0.0300, 0.0300, 0.0}},
-                                kAnkleBall, kBody.shin),
-                     {0.3195}));
-  out.push_back(ball("ankle ball", leg + 2, kAnkleBall, 0.0, 128.0));
+                     limb_rings(kKnee,
+                                {{0.039, 0.0440, 0.0445, 0.0440, 0.000},
+                                 {0.063, 0.0485, 0.0475, 0.0515, -0.002},
+                                 {0.108, 0.0510, 0.0470, 0.0590, -0.006},
+                                 {0.163, 0.0475, 0.0430, 0.0550, -0.007},
+                                 {0.228, 0.0390, 0.0370, 0.0430, -0.004},
+                                 {0.288, 0.0320, 0.0320, 0.0330, -0.001},
+                                 round_row(0.328, 0.0300),
+                                 round_row(0.352, 0.0302)},
+                                kAnkle, kBody.shin),
+                     {0.3165}));
+  out.push_back(ball("ankle ball", leg + 2, kAnkle, 0.0));
   out.push_back(foot("foot", leg + 2, left ? 1.0 : -1.0));
+}
+
+void add_head(std::vector<Surface>& out) {
+  out.push_back(ball("neck ball", kNeck, kNeckLow, 62.0));
+  out.push_back(ball("head ball", kHead, kNeckHigh, 56.0));
+  const auto low = mouth(0.0, kNeckLow, 1.0), high = mouth(kBody.head_rise, kNeckHigh, -1.0);
+  out.push_back(limb("neck", kNeck,
+                     {low[0],
+                      low[1],
+                      {0.034, 0.0400, 0.0400, 0.0400},
+                      {0.048, 0.0355, 0.0355, 0.0355},
+                      {0.060, 0.0350, 0.0350, 0.0350},
+                      high[1],
+                      high[0]},
+                     {}));
+  const auto chin = mouth(0.0, kNeckHigh, 1.0);
+  Surface head = limb("head", kHead,
+                      {chin[0],
+                       chin[1],
+                       {0.0215, 0.045, 0.055, 0.042, 0, 0.006},
+                       {0.038, 0.057, 0.076, 0.058, 0, 0.006},
+                       {0.068, 0.0695, 0.088, 0.077, 0, 0.004},
+                       {0.108, 0.0780, 0.0925, 0.092, 0, 0.002},
+                       {0.148, 0.0795, 0.0915, 0.098, 0, 0},
+                       {0.186, 0.0700, 0.0800, 0.088, 0, -0.002},
+                       {0.212, 0.0470, 0.0540, 0.060, 0, -0.004},
+                       {0.2245, 0.0, 0.0, 0.0, 0, -0.005}},
+                      {});
+  head.columns = 28;
+  head.grain = {.angle = 1.35, .pith_m = 0.19, .offset_m = 0.37};
+  out.push_back(head);
 }
 
 void add_trunk(std::vector<Surface>& out) {
   Surface pelvis = limb("pelvis", kPelvis,
-                        {{0.066, 0.108, 0.080, 0.080, 0, 0, 2.2},
-                         {0.040, 0.126, 0.088, 0.090, 0, 0, 2.2},
-                         {0.010, 0.140, 0.095, 0.101, 0, 0, 2.3},
-                         {-0.030, 0.151, 0.097, 0.109, 0, 0, 2.4},
-                         {-0.068, 0.151, 0.091, 0.106, 0, 0, 2.4},
-                         {-0.100, 0.130, 0.076, 0.090, 0, 0, 2.3},
-                         {-0.124, 0.084, 0.055, 0.062, 0, 0, 2.1},
-                         {-0.134, 0.0, 0.0, 0.0, 0, 0, 2.0}},
+                        {{0.066, 0.098, 0.074, 0.074, 0, 0, 2.2},
+                         {0.040, 0.116, 0.083, 0.085, 0, 0, 2.2},
+                         {0.012, 0.135, 0.092, 0.099, 0, 0, 2.3},
+                         {-0.026, 0.150, 0.096, 0.109, 0, 0, 2.4},
+                         {-0.062, 0.151, 0.091, 0.107, 0, 0, 2.4},
+                         {-0.094, 0.131, 0.077, 0.091, 0, 0, 2.3},
+                         {-0.119, 0.086, 0.056, 0.063, 0, 0, 2.1},
+                         {-0.129, 0.0, 0.0, 0.0, 0, 0, 2.0}},
                         {});
-  pelvis.columns = 32;
-  pelvis.grain = {.angle = 1.0, .pith_m = 0.22};
+  pelvis.columns = 28;
+  pelvis.grain = {.angle = 1.2, .pith_m = 0.26, .offset_m = 0.05};
   out.push_back(pelvis);
   Surface chest = limb("chest", kChest,
-                       {{0.010, 0.098, 0.080, 0.078, 0, 0, 2.2},
-                        {0.045, 0.110, 0.087, 0.084, 0, 0, 2.2},
-                        {0.110, 0.128, 0.101, 0.094, 0, 0.002, 2.3},
-                        {0.180, 0.145, 0.112, 0.100, 0, 0.003, 2.4},
-                        {0.235, 0.159, 0.112, 0.101, 0, 0.002, 2.4},
-                        {0.280, 0.165, 0.101, 0.097, 0, 0, 2.4},
-                        {0.312, 0.152, 0.084, 0.087, 0, 0, 2.3},
-                        {0.334, 0.118, 0.065, 0.070, 0, 0, 2.2},
-                        {0.347, 0.076, 0.051, 0.054, 0, 0, 2.1},
-                        {0.354, 0.050, 0.043, 0.044, 0, 0, 2.0},
-                        {0.356, 0.0375, 0.0375, 0.0375, 0, 0, 2.0}},
+                       {{0.006, 0.086, 0.072, 0.071, 0, 0, 2.1},
+                        {0.040, 0.101, 0.082, 0.079, 0, 0, 2.1},
+                        {0.100, 0.122, 0.099, 0.091, 0, 0.002, 2.2},
+                        {0.170, 0.143, 0.113, 0.100, 0, 0.003, 2.3},
+                        {0.230, 0.161, 0.114, 0.102, 0, 0.002, 2.3},
+                        {0.278, 0.171, 0.102, 0.098, 0, 0, 2.3},
+                        {0.311, 0.164, 0.085, 0.088, 0, 0, 2.2},
+                        {0.333, 0.132, 0.067, 0.071, 0, 0, 2.1},
+                        {0.347, 0.086, 0.054, 0.057, 0, 0, 2.0},
+                        {0.355, 0.053, 0.046, 0.047, 0, 0, 2.0},
+                        {0.357, 0.0405, 0.0405, 0.0405, 0, 0, 2.0}},
                        {});
-  chest.columns = 36;
-  chest.step_m = 0.04;
-  chest.grain = {.angle = 2.6, .pith_m = 0.24, .offset_m = 0.2};
+  chest.columns = 32;
+  chest.step_m = 0.045;
+  chest.grain = {.angle = 1.9, .pith_m = 0.30, .offset_m = 0.2};
   out.push_back(chest);
-  out.push_back(ball("neck ball", kNeck, kNeckBall, 45.0, 118.0));
-  const auto low = mouth(0.0, kNeckBall, 1.0), high = mouth(kBody.head_rise, kHeadBall, -1.0);
-  out.push_back(limb("neck", kNeck,
-                     {low[0],
-                      low[1],
-                      {0.038, 0.0345, 0.0345, 0.0345},
-                      {0.049, 0.0315, 0.0315, 0.0315},
-                      {0.058, 0.0310, 0.0310, 0.0310},
-                      high[1],
-                      high[0]},
-                     {}));
-  out.push_back(ball("head ball", kHead, kHeadBall, 43.0, 150.0));
-  const auto chin = mouth(0.0, kHeadBall, 1.0);
-  Surface head = limb("head", kHead,
-                      {chin[0],
-                       chin[1],
-                       {0.0265, 0.037, 0.050, 0.034, 0, 0.008},
-                       {0.043, 0.054, 0.077, 0.052, 0, 0.006},
-                       {0.075, 0.0685, 0.091, 0.073, 0, 0.004},
-                       {0.115, 0.0775, 0.094, 0.090, 0, 0.002},
-                       {0.155, 0.0785, 0.092, 0.097, 0, 0},
-                       {0.195, 0.067, 0.079, 0.086, 0, -0.002},
-                       {0.221, 0.043, 0.051, 0.056, 0, -0.004},
-                       {0.2325, 0.0, 0.0, 0.0, 0, -0.005}},
-                      {});
-  head.columns = 28;
-  head.grain = {.angle = 0.7, .pith_m = 0.16, .offset_m = 0.37};
-  out.push_back(head);
+  add_head(out);
 }
 
 }  // namespace
@@ -296,7 +312,7 @@ std::vector<Surface> base_surfaces() {
   constexpr double kLength = kFlat + kArc + kWall;
   Surface top{
       .name = "base plate", .matter = Matter::kPlaster, .unroll = Unroll::kDisc, .columns = 72};
-  top.tolerance_m = 0.0015;
+  top.tolerance_m = 0.0022;
   top.step_m = 0.3;
   top.texel_weight = 0.6;
   top.point = [](double t, double angle) {

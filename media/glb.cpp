@@ -180,8 +180,7 @@ void write_materials(Writer& writer, const std::vector<std::uint8_t>& wood_png) 
 }
 
 // Node 0 is the model, the joints follow in their order, then the base and the sash.
-void write_nodes(Writer& writer, int sash_mesh,
-                 const std::map<int, int>& meshes) {
+void write_nodes(Writer& writer, int sash_mesh, const std::map<int, int>& meshes) {
   const auto& joints = skeleton();
   const int base = kJointCount + 1, sash = kJointCount + 2;
   writer.append("nodes", {{"name", "mannequin"}, {"children", {base, 1, sash}}});

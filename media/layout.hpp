@@ -22,8 +22,8 @@ struct Placement {
 
 struct Layout {
   std::vector<Placement> placements{};  ///< one a chart
-  double texels_per_metre = 0;        ///< at 128 × 128 and weight 1
-  double coverage = 0;                ///< texels of 128 × 128 inside charts, conservatively
+  double texels_per_metre = 0;          ///< at 128 × 128 and weight 1
+  double coverage = 0;                  ///< texels of 128 × 128 inside charts, conservatively
 };
 
 /// Packs charts by their true outlines on a grid of 128 × 128 texels with two empty texels between

@@ -49,7 +49,7 @@ glm::dvec3 studio_soft(const glm::dvec3& d) {
   c += glm::dvec3(0.75, 0.85, 1.0) * softbox(d, 82.0, 18.0, 0.50, 0.60);
   c += glm::dvec3(3.4, 3.9, 4.8) * softbox(d, 158.0, 34.0, 0.20, 0.62);
   c += glm::dvec3(1.1, 1.05, 1.0) * glow(d, towards(0.0, 88.0), 30.0);
-  return c;
+  return 0.8 * c;
 }
 
 // A warm sun low over the horizon, its glow around it, and an evening sky.
@@ -61,8 +61,8 @@ glm::dvec3 low_sun(const glm::dvec3& d) {
   const glm::dvec3 rim = mix(cool, warm, near * near);
   glm::dvec3 sky =
       mix(mix(rim, middle, smooth_step(-0.02, 0.42, h)), zenith, smooth_step(0.12, 0.95, h));
-  sky += glm::dvec3(5.2, 2.75, 1.05) * glow(d, sun, 21.0);
-  sky += glm::dvec3(34.0, 22.0, 11.5) * glow(d, sun, 6.5);
+  sky += glm::dvec3(4.3, 2.35, 0.95) * glow(d, sun, 26.0);
+  sky += glm::dvec3(15.0, 9.6, 4.9) * glow(d, sun, 7.5);
   const glm::dvec3 ground =
       mix(glm::dvec3(0.14, 0.105, 0.085), glm::dvec3(0.30, 0.19, 0.115), near) *
       (1.0 - 0.35 * smooth_step(0.0, -0.9, h));

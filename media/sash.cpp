@@ -17,7 +17,7 @@ std::uint8_t sash_index(int joint) {
 }
 
 Influence wrap_influence(const glm::dvec3& p) {
-  const double chest = smooth_step(1.07, 1.15, p.y), pelvis = 1.0 - smooth_step(1.01, 1.09, p.y);
+  const double chest = smooth_step(1.06, 1.13, p.y), pelvis = 1.0 - smooth_step(1.01, 1.09, p.y);
   Influence out;
   out.joints = {sash_index(kPelvis), sash_index(kWaist), sash_index(kChest), 0};
   const double waist = std::max(1.0 - chest - pelvis, 0.0), sum = chest + pelvis + waist;
@@ -26,59 +26,66 @@ Influence wrap_influence(const glm::dvec3& p) {
   return out;
 }
 
-// Height of the folds over the cloth's mean surface: they run around the body and gather at the
-// knot.
+// One fold of cloth across: a round back and a steeper front.
+double fold(double p) { return exact_sin(kTau * p) + 0.38 * exact_sin(2.0 * kTau * p + 0.8); }
+
+// Height of the folds over the cloth's mean surface. The cloth goes round twice: the outer turn,
+// below an edge that slopes around the body, lies over the inner one, and both gather at the knot.
 double wrap_folds(double height, double angle) {
   const double from_knot = angle - kKnotAngle, away = 0.5 - 0.5 * exact_cos(from_knot);
-  const double gather = 0.55 + 0.45 * away;
-  const double p = (height - 0.42) * 4.6 / gather + 0.42 * exact_sin(from_knot) +
-                   0.16 * exact_sin(2.0 * angle + 1.1) +
-                   0.10 * exact_sin(3.0 * angle + 5.0 * height);
-  const double crest = exact_sin(kTau * p) + 0.32 * exact_sin(2.0 * kTau * p + 0.9);
-  const double over =
-      smooth_step(-0.05, 0.05, height - 0.47 - 0.24 * exact_sin(0.5 * from_knot + 0.4));
-  const double middle = smooth_step(0.0, 0.12, height) * smooth_step(1.0, 0.88, height);
-  return middle * (0.0042 * crest * (0.75 + 0.25 * exact_sin(2.0 * angle + 0.4)) + 0.0055 * over);
+  const double slope = exact_sin(from_knot), gather = 0.62 + 0.38 * away;
+  const double edge = 0.56 + 0.26 * slope + 0.03 * exact_sin(3.0 * angle);
+  const double outer = smooth_step(0.035, -0.025, height - edge);
+  const double p = (height - 0.35) / gather;
+  const double below = fold(2.3 * p + 0.62 * slope + 0.10 * exact_sin(3.0 * angle + 0.5) + 0.2);
+  const double above = fold(2.7 * p - 0.55 * slope + 0.12 * exact_sin(2.0 * angle + 2.1) + 0.55);
+  const double depth = 0.0040 * (0.8 + 0.35 * exact_sin(2.0 * angle + 0.4 + 3.0 * height));
+  const double hem = smooth_step(0.0, 0.10, height) * smooth_step(1.0, 0.90, height);
+  return hem * depth * (above + outer * (below - above)) +
+         0.0060 * outer * smooth_step(0.0, 0.06, height);
 }
 
 Surface wrap() {
-  static const auto body = loft({{0.988, 0.1470, 0.106, 0.1110, 0, 0, 2.2},
-                                 {1.030, 0.1335, 0.101, 0.1030, 0, 0, 2.2},
-                                 {1.072, 0.1230, 0.096, 0.0950, 0, 0, 2.2},
-                                 {1.110, 0.1195, 0.096, 0.0925, 0, 0, 2.2},
-                                 {1.148, 0.1240, 0.100, 0.0955, 0, 0, 2.2},
-                                 {1.176, 0.1285, 0.104, 0.0985, 0, 0, 2.2}},
+  static const auto body = loft({{0.980, 0.1450, 0.1040, 0.1110, 0, 0, 2.2},
+                                 {1.015, 0.1300, 0.0960, 0.0985, 0, 0, 2.2},
+                                 {1.055, 0.1130, 0.0890, 0.0880, 0, 0, 2.15},
+                                 {1.090, 0.1060, 0.0865, 0.0840, 0, 0, 2.1},
+                                 {1.125, 0.1095, 0.0900, 0.0865, 0, 0, 2.1},
+                                 {1.155, 0.1160, 0.0955, 0.0905, 0, 0, 2.15}},
                                 0.0);
-  Surface s{.name = "sash", .matter = Matter::kCloth, .columns = 60, .tolerance_m = 0.0014};
+  Surface s{.name = "sash", .matter = Matter::kCloth, .columns = 46, .tolerance_m = 0.0022};
   s.point = [](double t, double angle) {
-    constexpr double kLip = 0.07;
+    constexpr double kLip = 0.06;
     const double a = angle + kPi;
     const double height = std::clamp((t - kLip) / (1.0 - 2.0 * kLip), 0.0, 1.0);
     const double lip = std::max({0.0, (kLip - t) / kLip, (t - 1.0 + kLip) / kLip});
     glm::dvec3 p = body(height, a);
     const glm::dvec3 out = glm::normalize(glm::dvec3(p.x, 0.0, p.z));
-    p += out * (wrap_folds(height, a) - 0.020 * (1.0 - std::sqrt(std::max(1.0 - lip * lip, 0.0))));
-    p.y += (t < 0.5 ? -1.0 : 1.0) * 0.006 * exact_sin(kPi * std::min(lip, 1.0) * 0.9) -
-           0.012 * exact_cos(a - kKnotAngle);
+    p += out * (wrap_folds(height, a) - 0.018 * (1.0 - std::sqrt(std::max(1.0 - lip * lip, 0.0))));
+    p.y += (t < 0.5 ? -1.0 : 1.0) * 0.006 * exact_sin(kPi * std::min(lip, 1.0) * 0.8) -
+           0.010 * exact_cos(a - kKnotAngle);
     return p;
   };
   s.influence = [](const glm::dvec3& p, double) { return wrap_influence(p); };
   return s;
 }
 
+// A bun of twisted cloth, swept along the way the sash goes round.
 Surface knot() {
-  Surface s{.name = "knot", .matter = Matter::kCloth, .columns = 18, .tolerance_m = 0.0012};
+  Surface s{.name = "knot", .matter = Matter::kCloth, .columns = 20, .tolerance_m = 0.0018};
   s.narrowest = 0.45;
   s.point = [](double t, double angle) {
-    const double polar = kPi * t, sp = exact_sin(polar), cp = exact_cos(polar);
+    const double along = -exact_cos(kPi * t), girth = exact_sin(kPi * t);
     const double a = angle + kPi;
-    // Two loops pulled tight across each other.
-    const double groove = 1.0 + 0.10 * exact_sin(2.0 * a + 2.6 * cp) * sp;
-    const glm::dvec3 local(0.033 * groove * sp * exact_sin(a), 0.029 * groove * cp,
-                           0.025 * groove * sp * exact_cos(a));
+    const double twist = 1.0 + 0.085 * exact_sin(4.0 * a + 5.0 * along) +
+                         0.05 * exact_sin(7.0 * a + 6.0 * along + 1.0);
+    const double pinch = 1.0 - 0.16 * exact_exp(-12.0 * (along + 0.15) * (along + 0.15));
+    const double r = exact_pow(girth, 0.85) * twist * pinch;
+    const glm::dvec3 local(0.040 * along, 0.031 * r * exact_cos(a) - 0.014 * along * along,
+                           0.026 * r * exact_sin(a));
     const double s40 = exact_sin(kKnotAngle), c40 = exact_cos(kKnotAngle);
-    return glm::dvec3(0.098 + c40 * local.x + s40 * local.z, 1.026 + local.y + 0.2 * local.x,
-                      0.094 - s40 * local.x + c40 * local.z);
+    return glm::dvec3(0.096 + c40 * local.x + s40 * local.z, 1.028 + local.y - 0.25 * local.x,
+                      0.098 - s40 * local.x + c40 * local.z);
   };
   s.influence = [](const glm::dvec3&, double) {
     Influence out;
@@ -107,13 +114,13 @@ Surface tail(int first) {
   const glm::dvec3 root = tail_root(first) + glm::dvec3(0.0, kBody.pelvis_height, 0.0),
                    facing = tail_facing(first);
   const glm::dvec3 across = glm::cross(glm::dvec3(0.0, 1.0, 0.0), facing);
-  Surface s{.name = front ? "long tail" : "short tail", .matter = Matter::kCloth, .columns = 26};
-  s.tolerance_m = 0.0012;
+  Surface s{.name = front ? "long tail" : "short tail", .matter = Matter::kCloth, .columns = 22};
+  s.tolerance_m = 0.0018;
   s.step_m = 0.04;
   s.point = [=](double t, double angle) {
     const double along = std::min(t / kClose, 1.0);
     const double x = exact_sin(angle), z = exact_cos(angle + kPi);
-    const double half = 0.017 + 0.026 * smooth_step(0.0, 0.45, along) + 0.012 * along;
+    const double half = 0.016 + 0.018 * smooth_step(0.0, 0.45, along) + 0.013 * along;
     const double pleat =
         (0.0085 - 0.0035 * along) * exact_cos(1.45 * kPi * x + phase + 0.7 * along);
     const double curl = 2.0 * (half * x) * (half * x) * along;
@@ -123,7 +130,7 @@ Surface tail(int first) {
     const double down = length * t + slant * x * smooth_step(0.5, 1.0, along);
     return root + across * (half * x) - glm::dvec3(0.0, down, 0.0) + facing * (pleat - curl + face);
   };
-  s.bands = {{0.915, 0.930, Matter::kTrim}, {0.945, 0.985, Matter::kTrim}};
+  s.bands = {{0.920, 0.932, Matter::kTrim}, {0.948, 0.985, Matter::kTrim}};
   s.influence = [=](const glm::dvec3&, double t) { return tail_influence(first, t); };
   return s;
 }

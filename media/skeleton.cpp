@@ -44,12 +44,12 @@ std::array<JointInfo, kJointCount> make_skeleton() {
 }  // namespace
 
 glm::dvec3 tail_root(int first_joint) {
-  const double angle = kKnotAngle + (first_joint == kFrontTail ? -7.0 : 9.0) * kDegree;
-  return {0.158 * exact_sin(angle), 0.050, 0.132 * exact_cos(angle)};
+  const double angle = kKnotAngle + (first_joint == kFrontTail ? -9.0 : 11.0) * kDegree;
+  return {0.150 * exact_sin(angle), 0.055, 0.126 * exact_cos(angle)};
 }
 
 glm::dvec3 tail_facing(int first_joint) {
-  const double angle = kKnotAngle + (first_joint == kFrontTail ? -16.0 : 26.0) * kDegree;
+  const double angle = kKnotAngle + (first_joint == kFrontTail ? -20.0 : 34.0) * kDegree;
   return {exact_sin(angle), 0.0, exact_cos(angle)};
 }
 

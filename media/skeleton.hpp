@@ -37,13 +37,13 @@ inline constexpr int kTailJoints = 5;
 
 /// Lengths in metres, shared by the shapes and the walk.
 struct Proportions {
-  double hip_half = 0.09, hip_drop = 0.10;
+  double hip_half = 0.09, hip_drop = 0.092;
   double thigh = 0.41, shin = 0.385;
   double ankle_height = 0.075;
-  double shoulder_half = 0.198, shoulder_rise = 0.285;
+  double shoulder_half = 0.200, shoulder_rise = 0.285;
   double upper_arm = 0.285, forearm = 0.24;
-  double waist_rise = 0.105, chest_rise = 0.025, neck_rise = 0.352, head_rise = 0.088;
-  double pelvis_height = 0.97;  ///< standing straight
+  double waist_rise = 0.105, chest_rise = 0.025, neck_rise = 0.352, head_rise = 0.084;
+  double pelvis_height = 0.962;  ///< standing straight
 
   /// Foot: the sole seen from the side is a heel arc, a flat, a rocker and a toe arc; z from the
   /// ankle.
@@ -51,7 +51,7 @@ struct Proportions {
   double rocker_start = 0.088, rocker_radius = 0.13, rocker_angle = 0.60;
   double toe_radius = 0.018;
 
-  double front_tail_segment = 0.096, side_tail_segment = 0.076;
+  double front_tail_segment = 0.094, side_tail_segment = 0.068;
 };
 
 inline constexpr Proportions kBody;

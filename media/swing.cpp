@@ -12,13 +12,14 @@ namespace {
 
 constexpr int kPoints = kTailJoints + 1;
 constexpr int kSubsteps = 40;  // between two keys: half a millisecond each
-constexpr int kWarmUp = 6;  // clips until the motion repeats; each damps what remains of the start
+constexpr int kWarmUp = 12;  // clips until the motion repeats; each damps what remains of the start
 constexpr double kGravity = 9.81;
-constexpr double kDrag = 2.2;  // 1/s
+constexpr double kDrag = 3.6;   // 1/s, of the cloth's own motion
+constexpr double kWind = 0.30;  // share of the walking speed that blows: the body shelters the rest
 constexpr double kClearance =
     0.014;                          // of the chain from the thigh: the cloth's pleats and thickness
-constexpr double kFriction = 0.02;  // of the sliding speed, lost in one substep
-constexpr double kStiffness = 0.02;
+constexpr double kFriction = 0.05;  // of the sliding speed, lost in one substep
+constexpr double kStiffness = 45.0;  // of the springs between segments, 1/s²
 
 struct Chain {
   int first = 0;
@@ -63,22 +64,31 @@ void keep_out(const Drive& drive, glm::dvec3& now, glm::dvec3& before) {
   before = now - sliding * (1.0 - kFriction) - std::max(normal, 0.0) * outward;
 }
 
+// Springs that straighten the cloth; what pushes one point pushes its neighbours back.
+std::array<glm::dvec3, kPoints> bending(const Drive& drive, const Chain& chain) {
+  std::array<glm::dvec3, kPoints> out{};
+  for (std::size_t k = 1; k + 1 < kPoints; ++k) {
+    const glm::dvec3 bend = kStiffness * (chain.now[k - 1] - 2.0 * chain.now[k] + chain.now[k + 1]);
+    out[k - 1] -= bend;
+    out[k] += 2.0 * bend;
+    out[k + 1] -= bend;
+  }
+  const glm::dvec3 hang =
+      drive.pelvis_turn * glm::normalize(tail_facing(chain.first) * 0.3 - glm::dvec3(0, 1, 0));
+  out[1] += 2.0 * kStiffness * (chain.now[0] + hang * chain.segment - chain.now[1]);
+  return out;
+}
+
 void step_chain(const Drive& drive, double wind, double dt, Chain& chain) {
   chain.now[0] = drive.pelvis + drive.pelvis_turn * tail_root(chain.first);
-  const glm::dvec3 hang =
-      drive.pelvis_turn * glm::normalize(tail_facing(chain.first) * 0.25 - glm::dvec3(0, 1, 0));
+  const auto springs = bending(drive, chain);
   for (std::size_t k = 1; k < kPoints; ++k) {
     const glm::dvec3 velocity = (chain.now[k] - chain.before[k]) / dt;
-    const glm::dvec3 force =
-        glm::dvec3(0.0, -kGravity, 0.0) + kDrag * (glm::dvec3(0.0, 0.0, -wind) - velocity);
+    const glm::dvec3 force = springs[k] + glm::dvec3(0.0, -kGravity, 0.0) +
+                             kDrag * (glm::dvec3(0.0, 0.0, -kWind * wind) - velocity);
     const glm::dvec3 next = chain.now[k] + (velocity + force * dt) * dt;
     chain.before[k] = chain.now[k];
     chain.now[k] = next;
-  }
-  chain.now[1] += kStiffness * (chain.now[0] + hang * chain.segment - chain.now[1]);
-  for (std::size_t k = 2; k < kPoints; ++k) {
-    const glm::dvec3 straight = 2.0 * chain.now[k - 1] - chain.now[k - 2];
-    chain.now[k] += 0.2 * kStiffness * (straight - chain.now[k]);
   }
   for (int iteration = 0; iteration < 12; ++iteration) {
     for (std::size_t k = 1; k < kPoints; ++k) {

@@ -45,27 +45,28 @@ double noise(double u, double v, std::uint32_t nx, std::uint32_t ny, std::uint32
   return 2.0 * (low + ty * (high - low)) - 1.0;
 }
 
-// How far the wood of one year is into its late, dark growth: 0..1. The years are of uneven width.
+// How far the wood of one year is into its late, dark growth: 0..1. The years are of uneven width
+// and depth.
 double late_wood(double u, double v) {
-  constexpr double kYears = 26.0;
-  const double bent = u + 0.010 * noise(u, v, 3, 2, 1) + 0.0035 * noise(u, v, 9, 6, 2);
-  const double uneven = bent + 0.016 * noise(bent + 1.0, 0.5, 11, 1, 3);
-  const double year = uneven * kYears + 8.0;
+  constexpr std::uint32_t kYears = 17;
+  const double bent = u + 0.016 * noise(u, v, 3, 2, 1) + 0.006 * noise(u, v, 7, 5, 2) +
+                      0.0012 * noise(u, v, 24, 16, 3);
+  const double year = bent * kYears + 0.85 * noise(bent + 1.0, 0.5, 6, 1, 4) + 2.0 * kYears;
   const double phase = year - std::floor(year);
-  const double strength =
-      0.55 + 0.45 * lattice(static_cast<std::uint32_t>(std::floor(year)) % 26u, 7u, 4u);
-  return strength * (smooth_step(0.25, 0.90, phase) - smooth_step(0.92, 1.0, phase));
+  const double depth =
+      0.30 + 0.70 * lattice(static_cast<std::uint32_t>(std::floor(year)) % kYears, 7u, 4u);
+  return depth * (smooth_step(0.15, 0.88, phase) - smooth_step(0.90, 1.0, phase));
 }
 
 std::array<double, 3> wood_colour(double u, double v) {
   const double late = late_wood(u, v);
-  const double fibre = 0.5 * noise(u, v, 170, 20, 5) + 0.5 * noise(u, v, 90, 9, 6);
+  const double fibre = 0.6 * noise(u, v, 128, 8, 5) + 0.4 * noise(u, v, 64, 5, 6);
   const double cloud = noise(u, v, 4, 3, 8);
   // Short dark flecks along the grain, as in beech.
-  const double fleck = smooth_step(0.66, 0.92, noise(u, v, 128, 26, 9));
+  const double fleck = smooth_step(0.72, 0.95, noise(u, v, 100, 20, 9));
   const double dark =
-      std::clamp(0.16 + 0.50 * late + 0.055 * fibre + 0.07 * cloud + 0.16 * fleck, 0.0, 1.0);
-  const std::array<double, 3> pale{0.742, 0.545, 0.345}, deep{0.470, 0.268, 0.128};
+      std::clamp(0.15 + 0.46 * late + 0.045 * fibre + 0.08 * cloud + 0.10 * fleck, 0.0, 1.0);
+  const std::array<double, 3> pale{0.745, 0.535, 0.325}, deep{0.480, 0.268, 0.122};
   std::array<double, 3> out{};
   for (std::size_t c = 0; c < 3; ++c) out[c] = pale[c] + dark * (deep[c] - pale[c]);
   return out;

@@ -12,20 +12,11 @@ using namespace relit;
 using namespace relit::gles;
 using namespace relit::test;
 
-namespace {
-
-double from_half(std::uint16_t half) {
-  const int exponent = (half >> 10) & 31;
-  const double mantissa = half & 1023;
-  const double value =
-      exponent == 0 ? std::ldexp(mantissa, -24) : std::ldexp(mantissa + 1024, exponent - 25);
-  return (half & 0x8000) != 0 ? -value : value;
-}
-
-}  // namespace
-
 TEST_CASE("half floats are the nearest, ties to even", "[gles]") {
   CHECK(to_half(0.0f) == 0);
+  CHECK(from_half(0x3555) == Approx(1 / 3.0).epsilon(5e-4));
+  CHECK(from_half(0xC100) == -2.5f);
+  CHECK(from_half(0x0001) == std::ldexp(1.0f, -24));
   CHECK(to_half(1.0f) == 0x3C00);
   CHECK(to_half(-2.0f) == 0xC000);
   CHECK(to_half(65504.0f) == 0x7BFF);
@@ -39,19 +30,19 @@ TEST_CASE("half floats are the nearest, ties to even", "[gles]") {
   CHECK(to_half(std::ldexp(1.0f, -24)) == 0x0001);  // the least of all
   CHECK(to_half(std::ldexp(1.0f, -26)) == 0x0000);
   for (std::uint32_t h = 0; h < 0x7C00; ++h)
-    REQUIRE(to_half(static_cast<float>(from_half(static_cast<std::uint16_t>(h)))) == h);
+    REQUIRE(to_half(from_half(static_cast<std::uint16_t>(h))) == h);
   std::mt19937 random(7);
   for (int i = 0; i < 20000; ++i) {
     const float value = std::bit_cast<float>(static_cast<std::uint32_t>(random()));
     if (!(std::abs(value) < 65504)) continue;
     const std::uint16_t half = to_half(value);
-    const double error = std::abs(from_half(half) - value);
+    const double error = std::abs(double{from_half(half)} - value);
     // No neighbour is nearer.
     for (const int step : {-1, 1}) {
       const int neighbour = (half & 0x7FFF) + step;
       if (neighbour < 0 || neighbour >= 0x7C00) continue;
       const auto other = static_cast<std::uint16_t>((half & 0x8000) | neighbour);
-      REQUIRE(error <= std::abs(from_half(other) - value));
+      REQUIRE(error <= std::abs(double{from_half(other)} - value));
     }
   }
 }
@@ -85,7 +76,7 @@ TEST_CASE("light maps from the CPU reach the GPU in every format", "[gles][es2]"
         if (map->square_root)
           gl.ReadPixels(0, 0, kWidth, kHeight, GL_RGBA, GL_UNSIGNED_BYTE, bytes.data());
         else
-          gl.ReadPixels(0, 0, kWidth, kHeight, GL_RGBA, GL_FLOAT, pixels.data());
+          REQUIRE(read_float_pixels(device, kWidth, kHeight, pixels));
         for (std::size_t i = 0; i < kWidth * kHeight; ++i)
           for (std::size_t c = 0; c < 3; ++c) {
             const double expected = values[c * kWidth * kHeight + i];
