@@ -98,10 +98,10 @@ void Bake::summarize() {
   summary_.covered =
       static_cast<std::size_t>(std::count_if(prepared_.samples.begin(), prepared_.samples.end(),
                                              [](const TexelSample& s) { return s.covered; }));
-  for (const auto* warnings :
-       {&scene.warnings, &prepared_.packed.warnings, &prepared_.packed.materials.warnings}) {
-    summary_.warnings.insert(summary_.warnings.end(), warnings->begin(), warnings->end());
-  }
+  const auto add = [&](const std::vector<std::string>& warnings) {
+    summary_.warnings.insert(summary_.warnings.end(), warnings.begin(), warnings.end());
+  };
+  add(scene.warnings), add(prepared_.packed.warnings), add(prepared_.packed.materials.warnings);
 }
 
 Status Bake::trace() {

@@ -16,6 +16,7 @@
 #include "bake_minimal/scene.hpp"
 #include "bake_minimal/transfer.hpp"
 #include "container/base/result.hpp"
+#include "decoders/pose.hpp"
 
 /// From a glTF file to a .relit file: the baker as one call.
 namespace relit::bake {

@@ -15,7 +15,7 @@ struct Arguments {
 int run(const Arguments& arguments) {
   auto light = load_light(arguments.light, arguments.order);
   if (!light) return report(light.error());
-  if (const Status status = write_light_json(light->light, arguments.output); !status)
+  if (const Status status = write_light_json(arguments.output, light->light); !status)
     return report(status.error());
   const auto& mean = light->light.sh.front();
   std::fprintf(stderr, "%s: order %d, mean radiance %.4g %.4g %.4g\n", arguments.output.c_str(),

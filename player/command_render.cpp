@@ -84,7 +84,7 @@ Status set_background(const Arguments& arguments, const LoadedLight& light,
                               light.environment->rgb};
     background.blur_rad = static_cast<float>(glm::radians(arguments.blur_deg));
     background.max_side = 512;
-    renderer.set_rotation(static_cast<float>(glm::radians(arguments.light.rotate_deg)));
+    renderer.set_rotation(static_cast<float>(light.environment_rotation_rad));
   } else if (kind == "light" || kind == "sh") {
     background.kind = gles::Background::Kind::kHarmonics;
     for (const auto& row : light.light.sh) {
