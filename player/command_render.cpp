@@ -53,7 +53,7 @@ double luminance(const std::array<double, 3>& rgb) {
 Result<float> choose_exposure(const std::string& text, const decoders::Light& light) {
   if (text == "auto") {
     const double mean = luminance(light.sh.front()) * 0.28209479177387814;
-    return mean > 0 ? static_cast<float>(1.1 / mean) : 1.0f;
+    return mean > 0 ? static_cast<float>(0.8 / mean) : 1.0f;
   }
   double stops = 0;
   const auto [rest, error] = std::from_chars(text.data(), text.data() + text.size(), stops);
