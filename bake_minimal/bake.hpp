@@ -58,6 +58,7 @@ struct PreparedBake {
   container::Rational frame_rate;
   std::uint64_t frames = 1;
   std::uint32_t segment_frames = 25;
+  std::vector<std::uint32_t> added;  ///< primitives that the baker made: the ground
   AtlasReport atlas;
   PackedScene packed;
   PoseEncoding pose;

@@ -53,7 +53,9 @@ Status load(const BakeOptions& options, PreparedBake& out) {
       static_cast<std::uint32_t>(std::clamp(std::round(options.segment_s * fps), 1.0, 65536.0));
   if (!options.ground) return {};
   RELIT_ASSIGN(const Bounds bounds, clip_bounds(out.scene, out.clip, fps));
-  return add_ground(out.scene, bounds, *options.ground);
+  RELIT_ASSIGN(const std::uint32_t disc, add_ground(out.scene, bounds.min, bounds.max, *options.ground));
+  out.added.push_back(disc);
+  return {};
 }
 
 Status unwrap(const BakeOptions& options, PreparedBake& out) {
@@ -68,6 +70,7 @@ Status unwrap(const BakeOptions& options, PreparedBake& out) {
     scene.pose_primitive(scene.primitives[p], pose, world, posed[p], {});
   }
   AtlasOptions atlas = options.atlas;
+  atlas.added = out.added;
   atlas.width = options.transfer.width, atlas.height = options.transfer.height;
   RELIT_ASSIGN(out.atlas, assign_lightmap_uvs(scene, posed, atlas));
   return {};

@@ -104,7 +104,7 @@ void add_options(CLI::App& app, Arguments& a) {
                "add a disc under the feet that takes the shadow and gives back light")
       ->group("Transfer");
   app.add_option("--ground-radius", a.ground_radius,
-                 "of the disc, in metres (default: from the clip's width)")
+                 "of the disc, over half the width of the clip (default: 1.6)")
       ->group("Transfer");
   app.add_option("--ground-color", a.ground_color, "linear albedo of the disc: R G B")
       ->expected(3)
@@ -187,9 +187,9 @@ Status complete(Arguments& a, const CLI::App& app) {
   }
   if (a.ground || app.count("--ground-radius") > 0 || app.count("--ground-color") > 0) {
     bake.ground.emplace();
-    if (app.count("--ground-radius") > 0) bake.ground->radius_m = a.ground_radius;
+    if (app.count("--ground-radius") > 0) bake.ground->radius = a.ground_radius;
     if (a.ground_color.size() == 3)
-      bake.ground->color = {a.ground_color[0], a.ground_color[1], a.ground_color[2]};
+      bake.ground->albedo = {a.ground_color[0], a.ground_color[1], a.ground_color[2]};
   }
   if (a.preset == "paper") {
     const int threads = bake.coding.threads;

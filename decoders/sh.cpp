@@ -94,7 +94,7 @@ void exchange_y_and_z(Light& light) {
 
 void rotate_light_y(Light& light, double angle_rad) {
   const int order = light.order();
-  if (order < 1) return;
+  if (order < 1 || angle_rad == 0) return;  // not turned is the same to the bit
   // The harmonics' polar axis is z. With y and z exchanged the turn is about the polar axis, where
   // it mixes only m and −m, by the angle mφ.
   exchange_y_and_z(light);
