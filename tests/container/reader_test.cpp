@@ -354,7 +354,7 @@ Bytes big_file() {
   MemorySink sink;
   auto writer = Writer::create(sink, "big").value();
   sample::add_static(writer);
-  for (const std::uint64_t first : {0, 3}) {
+  for (const std::uint64_t first : {0ull, 3ull}) {
     const std::uint32_t frames = first == 0 ? 3 : 2;
     auto chunks = sample::chunks(first, frames);
     auto& big = chunks[1];

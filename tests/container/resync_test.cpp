@@ -75,7 +75,7 @@ TEST_CASE("a damaged record header costs the rest of its segment") {
 TEST_CASE("a damaged segment record costs its segment") {
   const Bytes file = sample::file();
   // In the header, in the marker, in the fields.
-  for (const std::uint64_t where : {2, 30, 50}) {
+  for (const std::uint64_t where : {2ull, 30ull, 50ull}) {
     for (const bool pipe : {false, true}) {
       Bytes damaged = file;
       damaged[sample::offset_of(file, types::kSegment, 1) + where] ^= 1;
@@ -105,7 +105,7 @@ TEST_CASE("damage of the first segment leaves the static part usable") {
 TEST_CASE("segments that a cut record swallowed are found again") {
   const Bytes file = sample::file();
   const auto from = sample::offset_of(file, types::kChunk, 1) + 32;
-  for (const std::uint64_t missing : {8, 16}) {
+  for (const std::uint64_t missing : {8ull, 16ull}) {
     for (const bool pipe : {false, true}) {
       // Bytes are missing inside a chunk, so that it reaches into its neighbours.
       Bytes shorter = file;
