@@ -28,6 +28,7 @@ constexpr std::size_t kCutCandidates = 5;
 constexpr std::size_t kGreatestPieces = 4;
 constexpr double kLeastGain = 1.04;  // in scale, for one more seam
 constexpr double kGoodFill = 0.72;
+constexpr double kSmallChart = 6;         // texels a side
 constexpr double kLeastShapeFill = 0.35;  // of the bounding rectangle, after a union
 
 FlattenLimits cut_limits(const Surface& surface, const PackOptions& options) {
@@ -69,9 +70,11 @@ void flatten_pieces(const Surface& surface, std::vector<std::uint32_t> patch,
 
 class Merger {
  public:
-  Merger(const Surface& surface, std::vector<FlatChart> charts, const FlattenLimits& limits)
+  Merger(const Surface& surface, std::vector<FlatChart> charts, const FlattenLimits& limits,
+         double small_area)
       : surface_(surface),
         limits_(limits),
+        small_area_(small_area),
         charts_(std::move(charts)),
         version_(charts_.size(), 0),
         chart_of_(surface.triangles.size(), kNoTriangle) {
@@ -117,28 +120,39 @@ class Merger {
     for (const std::uint32_t t : charts_[c].triangles) chart_of_[t] = c;
   }
 
+  struct Border {
+    double length = 0;  // a crease is the better place for a seam, so it counts half
+    double sharp = 0;
+  };
+
   void push_pairs(std::uint32_t c, bool only_later) {
-    std::map<std::uint32_t, double> shared;
+    std::map<std::uint32_t, Border> borders;
     for (const std::uint32_t t : charts_[c].triangles) {
       for (std::size_t i = 0; i < 3; ++i) {
         const std::uint32_t n = surface_.neighbours[t][i];
         if (n == kNoTriangle || chart_of_[n] == c) continue;
-        // A crease is the better place for a seam.
-        const double worth = surface_.creases[t][i] ? 0.5 : 1.0;
-        shared[chart_of_[n]] += worth * surface_.edge_length(t, i);
+        const double edge = surface_.edge_length(t, i);
+        Border& border = borders[chart_of_[n]];
+        border.length += surface_.creases[t][i] == Crease::kSmooth ? edge : edge / 2;
+        if (surface_.creases[t][i] == Crease::kSharp) border.sharp += edge / 2;
       }
     }
-    for (const auto& [other, length] : shared) {
+    for (const auto& [other, border] : borders) {
       if (only_later && other < c) continue;
+      // Light breaks off at a sharp edge, and filtering would blur it; charts of few texels are
+      // unfolded all the same, since gutters would cost more than they show.
+      const bool sharp = border.sharp > 0.5 * border.length;
+      if (sharp && std::min(charts_[c].area, charts_[other].area) > small_area_) continue;
       const double outline = std::min(charts_[c].outline, charts_[other].outline);
       if (!(outline > 0)) continue;
       const std::uint32_t a = std::min(c, other), b = std::max(c, other);
-      queue_.push({length / outline, a, b, version_[a], version_[b]});
+      queue_.push({border.length / outline, a, b, version_[a], version_[b]});
     }
   }
 
   const Surface& surface_;
   const FlattenLimits& limits_;
+  double small_area_;
   std::vector<FlatChart> charts_;
   std::vector<std::uint32_t> version_;
   std::vector<std::uint32_t> chart_of_;
@@ -316,8 +330,10 @@ std::vector<FlatChart> make_charts(const Surface& surface, const PackOptions& op
   for (auto& patch : grow_patches(surface)) {
     flatten_pieces(surface, std::move(patch), limits, charts);
   }
+  const double texel = kOverlapFineness / limits.overlap_scale;
+  const double small_area = kSmallChart * kSmallChart * texel * texel;
   const FlattenLimits tighter = union_limits(limits);
-  charts = Merger(surface, std::move(charts), tighter).run();
+  charts = Merger(surface, std::move(charts), tighter, small_area).run();
   Trimmer(surface, limits, options).run(charts);
   return charts;
 }

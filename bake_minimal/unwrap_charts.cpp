@@ -111,7 +111,9 @@ class Grower {
 
   double cost(std::uint32_t t, std::uint32_t patch, std::uint8_t side) const {
     const double cosine = glm::dot(surface_.normals[t], axis(patch));
-    if (cosine < kConeCosine) return std::numeric_limits<double>::infinity();
+    if (cosine < kConeCosine || surface_.creases[t][side] == Crease::kSharp) {
+      return std::numeric_limits<double>::infinity();
+    }
     double inside = 0, all = 0;
     for (std::size_t i = 0; i < 3; ++i) {
       const double length = surface_.edge_length(t, i);
@@ -120,7 +122,7 @@ class Grower {
       if (n != kNoTriangle && patch_[n] == patch) inside += length;
     }
     const double outline = (all - 2 * inside) / all;
-    const double crease = surface_.creases[t][side] ? kCreaseWeight : 0.0;
+    const double crease = surface_.creases[t][side] == Crease::kHard ? kCreaseWeight : 0.0;
     return (1 - cosine) / (1 - kConeCosine) + kOutlineWeight * outline + crease;
   }
 
@@ -187,7 +189,7 @@ class Grower {
           if (n == kNoTriangle) continue;
           if (patch_[n] == patch_[t]) {
             ++own;
-          } else if (!surface_.creases[t][i]) {
+          } else if (surface_.creases[t][i] == Crease::kSmooth) {
             others[i] = patch_[n];
           }
         }

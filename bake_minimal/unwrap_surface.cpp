@@ -11,7 +11,8 @@ namespace {
 
 constexpr double kWeldShare = 1e-6;
 constexpr double kLeastHeightShare = 1e-4;
-constexpr double kCreaseCosine = 0.866;  // 30°
+constexpr float kHardCosine = 0.866f;  // 30°
+constexpr double kSharpCosine = 0.5;   // 60°
 
 struct WeldKey {
   std::uint32_t group;
@@ -141,18 +142,22 @@ class EdgeJoiner {
     if (from != kNoTriangle || to != kNoTriangle) return;
     from = b.triangle;
     to = a.triangle;
-    const bool crease = is_crease(a, b);
+    const Crease crease = crease_between(a, b);
     surface_.creases[a.triangle][a.side] = crease;
     surface_.creases[b.triangle][b.side] = crease;
   }
 
-  bool is_crease(const HalfEdge& a, const HalfEdge& b) const {
-    if (input_.normals.empty()) return false;
+  Crease crease_between(const HalfEdge& a, const HalfEdge& b) const {
+    if (input_.normals.empty()) return Crease::kSmooth;
     const auto normal = [&](const HalfEdge& e, std::size_t end) {
       return input_.normals[input_.indices[3 * e.triangle + (e.side + end) % 3u]];
     };
-    return glm::dot(normal(a, 0), normal(b, 1)) < kCreaseCosine ||
-           glm::dot(normal(a, 1), normal(b, 0)) < kCreaseCosine;
+    if (glm::dot(normal(a, 0), normal(b, 1)) >= kHardCosine &&
+        glm::dot(normal(a, 1), normal(b, 0)) >= kHardCosine) {
+      return Crease::kSmooth;
+    }
+    const double bend = glm::dot(surface_.normals[a.triangle], surface_.normals[b.triangle]);
+    return bend < kSharpCosine ? Crease::kSharp : Crease::kHard;
   }
 
   Surface& surface_;
@@ -172,7 +177,7 @@ Surface::Surface(const SurfaceInput& input) {
   normals.assign(count, glm::dvec3(0.0));
   areas.assign(count, 0.0);
   neighbours.assign(count, {kNoTriangle, kNoTriangle, kNoTriangle});
-  creases.assign(count, {false, false, false});
+  creases.assign(count, {Crease::kSmooth, Crease::kSmooth, Crease::kSmooth});
   for (std::size_t t = 0; t < count; ++t) {
     bool usable = true;
     for (std::size_t i = 0; i < 3; ++i) {

@@ -21,6 +21,13 @@ struct SurfaceInput {
   std::span<const std::uint32_t> indices;
 };
 
+/// How the shading bends across an edge.
+enum class Crease : std::uint8_t {
+  kSmooth,
+  kHard,   ///< the vertex normals differ by more than 30°
+  kSharp,  ///< and the triangles by more than 60°
+};
+
 /// Triangles joined over their edges, whatever vertices the file split. Vertices of one group
 /// closer than a millionth of the extent are one point. Two triangles are neighbours across an edge
 /// that they run through in opposite directions; where more than two meet (soup, thin sheets
@@ -32,7 +39,7 @@ struct Surface {
   std::vector<glm::dvec3> normals;                      ///< by triangle; 0 without area
   std::vector<double> areas;
   std::vector<std::array<std::uint32_t, 3>> neighbours;  ///< across corner i to i+1, or kNoTriangle
-  std::vector<std::array<bool, 3>> creases;              ///< the vertex normals differ across it
+  std::vector<std::array<Crease, 3>> creases;            ///< across corner i to i+1
 
   explicit Surface(const SurfaceInput& input);
 
