@@ -121,7 +121,7 @@ Surface foot(const char* name, int joint, double side) {
   static const std::vector<glm::dvec2> kHalf{{-0.068, 0.028}, {-0.035, 0.030}, {0.0, 0.031},
                                              {0.05, 0.036},   {0.095, 0.0425}, {0.13, 0.043},
                                              {0.155, 0.039},  {0.17, 0.034}};
-  Surface s{.name = name, .joint = joint, .columns = 22, .tolerance_m = 0.0006, .step_m = 0.035};
+  Surface s{.name = name, .joint = joint, .columns = 20, .tolerance_m = 0.0012, .step_m = 0.035};
   s.narrowest = 0.5;
   s.point = [side](double t, double angle) {
     const double z0 = sole_back(), z1 = sole_front();
@@ -311,7 +311,7 @@ std::vector<Surface> base_surfaces() {
   constexpr double kFlat = kRadius - kRound, kArc = 0.5 * kPi * kRound, kWall = kThick - kRound;
   constexpr double kLength = kFlat + kArc + kWall;
   Surface top{
-      .name = "base plate", .matter = Matter::kPlaster, .unroll = Unroll::kDisc, .columns = 72};
+      .name = "base plate", .matter = Matter::kPlaster, .unroll = Unroll::kDisc, .columns = 64};
   top.tolerance_m = 0.0022;
   top.step_m = 0.3;
   top.texel_weight = 0.6;
@@ -331,7 +331,7 @@ std::vector<Surface> base_surfaces() {
                {0.764 / kLength, 0.780 / kLength, Matter::kWalnut}};
   top.grain = {.angle = 0.3, .pith_m = 0.9};
   Surface bottom{
-      .name = "base underside", .matter = Matter::kPlaster, .unroll = Unroll::kDisc, .columns = 72};
+      .name = "base underside", .matter = Matter::kPlaster, .unroll = Unroll::kDisc, .columns = 64};
   bottom.step_m = 1.0;
   bottom.texel_weight = 0.06;
   bottom.point = [](double t, double angle) {

@@ -35,10 +35,6 @@ void generate(const fs::path& folder) {
       stderr,
       "mannequin: %zu triangles in %zu charts, %.1f %% of the atlas, %.1f texels/m at 128\n",
       triangles, figure.patches.size(), 100.0 * figure.coverage, figure.texels_per_metre);
-  if (getenv("PV"))
-    for (const auto& patch : figure.patches)
-      std::fprintf(stderr, "%s %zu rows %zu\n", patch.name.c_str(), patch.triangles.size(),
-                   patch.chart.row_at.size());
   save(folder / "mannequin.glb", relit::media::write_glb(figure, relit::media::make_wood_png()));
 }
 

@@ -44,8 +44,8 @@ std::array<JointInfo, kJointCount> make_skeleton() {
 }  // namespace
 
 glm::dvec3 tail_root(int first_joint) {
-  const double angle = kKnotAngle + (first_joint == kFrontTail ? -9.0 : 11.0) * kDegree;
-  return {0.150 * exact_sin(angle), 0.055, 0.126 * exact_cos(angle)};
+  const double angle = kKnotAngle + (first_joint == kFrontTail ? -7.5 : 8.5) * kDegree;
+  return {0.148 * exact_sin(angle), 0.061, 0.124 * exact_cos(angle)};
 }
 
 glm::dvec3 tail_facing(int first_joint) {
