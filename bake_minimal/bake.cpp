@@ -120,6 +120,10 @@ Status Bake::trace() {
       bounds_min_ = glm::min(bounds_min_, p), bounds_max_ = glm::max(bounds_max_, p);
     RELIT_TRY(tracer.trace(poser.positions(), poser.normals(), store_->frame(k), flags));
     if (std::find(flags.begin(), flags.end(), 1) != flags.end()) buried_[k] = flags;
+    const auto [least, largest] =
+        std::ranges::minmax(store_->frame(k).first(3 * prepared_.samples.size()));
+    summary_.least_t0 = std::min(summary_.least_t0, least);
+    summary_.largest_t0 = std::max(summary_.largest_t0, largest);
     summary_.rays += tracer.rays();
     progress_.advance(k + 1);
   }

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -46,6 +47,9 @@ struct BakeSummary {
   std::size_t vertices = 0, triangles = 0, samples = 0, covered = 0;
   AtlasReport atlas;
   std::uint64_t rays = 0;
+  /// Least and largest T_0 of all texels and frames: 0 to 0.2821 where surfaces conserve energy.
+  float least_t0 = std::numeric_limits<float>::infinity();
+  float largest_t0 = -std::numeric_limits<float>::infinity();
   double trace_s = 0, code_s = 0;
   std::uint64_t bytes = 0, image_bytes = 0, mesh_bytes = 0, pose_bytes = 0, video_bytes = 0;
   std::vector<std::string> warnings;

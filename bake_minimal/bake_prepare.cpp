@@ -53,7 +53,8 @@ Status load(const BakeOptions& options, PreparedBake& out) {
       static_cast<std::uint32_t>(std::clamp(std::round(options.segment_s * fps), 1.0, 65536.0));
   if (!options.ground) return {};
   RELIT_ASSIGN(const Bounds bounds, clip_bounds(out.scene, out.clip, fps));
-  RELIT_ASSIGN(const std::uint32_t disc, add_ground(out.scene, bounds.min, bounds.max, *options.ground));
+  RELIT_ASSIGN(const std::uint32_t disc,
+               add_ground(out.scene, bounds.min, bounds.max, *options.ground));
   out.added.push_back(disc);
   return {};
 }

@@ -236,6 +236,7 @@ void print_json(const BakeSummary& s, const BakeOptions& options) {
                          {"density_p95", s.atlas.density_p95},
                          {"reason", s.atlas.reason}};
   json["rays"] = s.rays;
+  json["t0"] = {s.least_t0, s.largest_t0};
   json["seconds"] = {{"trace", s.trace_s}, {"code", s.code_s}};
   json["bytes"] = {{"file", s.bytes},
                    {"images", s.image_bytes},

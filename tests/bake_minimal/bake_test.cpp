@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: MIT
+// The baker as a whole: files and what they hold, determinism, and everything that can go wrong.
+#include "bake_minimal/bake.hpp"
+
+#include <sys/wait.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <functional>
+#include <numbers>
+
+#include "container/byte_source.hpp"
+#include "container/reader.hpp"
+#include "decoders/npy.hpp"
+#include "decoders/plane_decoder.hpp"
+#include "decoders/sh.hpp"
+#include "tests/test.hpp"
+
+using namespace relit;
+using namespace relit::bake;
+namespace fs = std::filesystem;
+
+namespace {
+
+struct Folder {
+  fs::path path;
+  Folder() {
+    std::string name = (fs::temp_directory_path() / "relit-bake-test-XXXXXX").string();
+    path = ::mkdtemp(name.data());
+  }
+  ~Folder() { fs::remove_all(path); }
+  Folder(const Folder&) = delete;
+  Folder& operator=(const Folder&) = delete;
+};
+
+fs::path mannequin() { return fs::path(std::getenv("RELIT_BINARY_DIR")) / "media/mannequin.glb"; }
+
+BakeOptions small_bake(const Folder& folder, const std::string& name) {
+  BakeOptions options;
+  options.input = mannequin();
+  options.output = folder.path / name;
+  options.max_frames = 3;
+  options.transfer.directions = 64;
+  options.transfer.width = options.transfer.height = 64;
+  options.coding.preset = "ultrafast";
+  return options;
+}
+
+BakeSummary must_bake(const BakeOptions& options) {
+  Progress quiet(true);
+  auto summary = bake::bake(options, quiet);
+  if (!summary) FAIL(summary.error().message);
+  return *summary;
+}
+
+std::string bytes_of(const fs::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+// All transfer of a file, [frames][coefficients][3][H][W], and its records.
+struct Decoded {
+  container::FileContents contents;
+  std::vector<float> transfer;
+};
+
+Decoded decode(const fs::path& path) {
+  auto source = container::FileSource::open(path.string());
+  REQUIRE(source);
+  auto reader = container::Reader::open(std::move(*source));
+  REQUIRE(reader);
+  auto contents = container::load_static(*reader);
+  REQUIRE(contents);
+  const container::ModelRecord& model = contents->models.front();
+  const auto layers = contents->layers_of(model.id);
+  auto planes = decoders::PlaneDecoder::open(model, layers);
+  REQUIRE(planes);
+  container::SegmentRecord segment;
+  for (;;) {
+    auto record = reader->next();
+    REQUIRE(record);
+    if (!*record) break;
+    if (auto* s = std::get_if<container::SegmentRecord>(&(*record)->body)) segment = *s;
+    if (auto* c = std::get_if<container::ChunkRecord>(&(*record)->body))
+      REQUIRE(planes->add_chunk(segment, std::move(*c)));
+  }
+  Decoded out;
+  const std::size_t frame_size =
+      std::size_t{3} * static_cast<std::size_t>(decoders::coefficient_count(model.order)) *
+      model.width * model.height;
+  for (std::uint64_t k = 0; k < contents->clips.front().frame_count; ++k) {
+    auto view = planes->frame(k);
+    REQUIRE(view);
+    std::vector<float> frame(frame_size);
+    REQUIRE(decoders::reconstruct(view->planes(), model, layers, frame));
+    out.transfer.insert(out.transfer.end(), frame.begin(), frame.end());
+  }
+  out.contents = std::move(*contents);
+  return out;
+}
+
+}  // namespace
+
+TEST_CASE("a bake is the same bytes for any number of threads, and other bytes for another seed") {
+  const Folder folder;
+  BakeOptions one = small_bake(folder, "one.relit"), five = small_bake(folder, "five.relit"),
+              seed = small_bake(folder, "seed.relit");
+  one.transfer.threads = 1, five.transfer.threads = 5, seed.transfer.seed = 1;
+  must_bake(one), must_bake(five), must_bake(seed);
+  CHECK(bytes_of(one.output) == bytes_of(five.output));
+  CHECK(bytes_of(one.output) != bytes_of(seed.output));
+}
+
+TEST_CASE("a lossless file holds the reference to within the quantiser's bound") {
+  for (const int bit_depth : {8, 10}) {
+    const Folder folder;
+    BakeOptions options = small_bake(folder, "lossless.relit");
+    options.coding.lossless = true;
+    options.coding.bit_depth = bit_depth;
+    options.reference = folder.path / "reference.npy";
+    must_bake(options);
+    const auto reference = decoders::read_npy(options.reference);
+    REQUIRE(reference);
+    const Decoded file = decode(options.output);
+    REQUIRE(reference->values.size() == file.transfer.size());
+    const auto layers = file.contents.layers_of(file.contents.models.front().id);
+    const std::size_t texels = 64 * 64;
+    double worst = 0;
+    for (std::size_t i = 0; i < file.transfer.size(); ++i) {
+      const int n = static_cast<int>(i / (3 * texels) % 9), c = static_cast<int>(i / texels % 3);
+      // Beyond half a step: the rounding of the reference, of the mean and of the sum to float.
+      const double bound = quantiser_bound(layers, n, c) + 4 * 6e-8;
+      worst = std::max(worst, std::abs(static_cast<double>(file.transfer[i]) -
+                                       static_cast<double>(reference->values[i])) /
+                                  bound);
+    }
+    INFO("bit depth " << bit_depth);
+    CHECK(worst <= 1);
+    CHECK(worst > 0.5);  // a bound that is never approached would prove nothing
+  }
+}
+
+TEST_CASE("T_0 of every texel and frame is physical") {
+  const Folder folder;
+  BakeOptions options = small_bake(folder, "bounds.relit");
+  options.transfer.directions = 1024, options.transfer.bounces = 3;
+  const BakeSummary summary = must_bake(options);
+  // The lattice of 1024 directions errs by less than 0.5 % on an open hemisphere.
+  CHECK(summary.least_t0 >= 0);
+  CHECK(summary.largest_t0 <= 0.28209479f * 1.005f);
+  CHECK(summary.largest_t0 > 0.25f);
+}
+
+TEST_CASE("the paper's preset is a grid of MPEG-4 mantissas with an exponent for every texel") {
+  const Folder folder;
+  BakeOptions options = small_bake(folder, "paper.relit");
+  options.coding = paper_options();
+  must_bake(options);
+  const Decoded file = decode(options.output);
+  REQUIRE(file.contents.layers.size() == 1);
+  const container::LayerRecord& layer = file.contents.layers.front();
+  CHECK(layer.codec == "mpeg4");
+  CHECK(layer.exponent_codec == "ffv1");
+  CHECK(layer.exponent_block == 1);
+  CHECK(layer.planes.size() == 27);
+  CHECK(layer.coded_width == 192);
+  CHECK(layer.planes[3 * 5].mantissa_rect.x == 128);
+  CHECK(layer.planes[3 * 5].mantissa_rect.y == 64);
+}
+
+TEST_CASE("what cannot be written is said before tracing, and nothing is left behind") {
+  const Folder folder;
+  BakeOptions options = small_bake(folder, "no/such/folder.relit");
+  Progress quiet(true);
+  const auto missing = bake::bake(options, quiet);
+  REQUIRE_FALSE(missing);
+  CHECK(missing.error().message.find("no/such") != std::string::npos);
+  options = small_bake(folder, "out.relit");
+  options.input = folder.path / "absent.glb";
+  const auto absent = bake::bake(options, quiet);
+  REQUIRE_FALSE(absent);
+  CHECK(absent.error().message.find("absent.glb") != std::string::npos);
+  std::ofstream(folder.path / "bad.glb") << "not a glTF";
+  options.input = folder.path / "bad.glb";
+  CHECK_FALSE(bake::bake(options, quiet));
+  CHECK_FALSE(fs::exists(options.output));
+  CHECK(std::distance(fs::directory_iterator(folder.path), fs::directory_iterator()) == 1);
+}
+
+TEST_CASE("options that make no sense are refused with what would be right") {
+  const Folder folder;
+  Progress quiet(true);
+  const auto message = [&](const std::function<void(BakeOptions&)>& change) {
+    BakeOptions options = small_bake(folder, "x.relit");
+    change(options);
+    const auto result = bake::bake(options, quiet);
+    REQUIRE_FALSE(result);
+    CHECK(result.error().code == ErrorCode::kInvalid);
+    return result.error().message;
+  };
+  CHECK(message([](BakeOptions& o) { o.transfer.order = 7; }).find("0 to 3") != std::string::npos);
+  CHECK(message([](BakeOptions& o) { o.transfer.width = 0; }).find("1 to 4096") !=
+        std::string::npos);
+  CHECK(message([](BakeOptions& o) { o.segment_s = 0; }).find("--segment") != std::string::npos);
+  CHECK_FALSE(
+      message([](BakeOptions& o) { o.coding.codec = "mpeg4", o.coding.bit_depth = 10; }).empty());
+}
+
+TEST_CASE("frames lie at k / fps below the duration") {
+  CHECK(frame_count(2.0, {50, 1}) == 100);
+  CHECK(frame_count(2.0000001, {50, 1}) == 100);
+  CHECK(frame_count(2.01, {50, 1}) == 101);
+  CHECK(frame_count(0, {50, 1}) == 1);
+  CHECK(frame_count(1.0, {30000, 1001}) == 30);
+}
+
+TEST_CASE("the command's exit status is 1 for bad input and 2 for bad usage") {
+  const Folder folder;
+  const std::string command =
+      (fs::path(std::getenv("RELIT_BINARY_DIR")) / "bin/relit-bake").string();
+  const auto status = [&](const std::string& arguments) {
+    return WEXITSTATUS(std::system((command + " " + arguments + " >/dev/null 2>&1").c_str()));
+  };
+  CHECK(status("--help") == 0);
+  CHECK(status("") == 2);
+  CHECK(status("--no-such-option") == 2);
+  CHECK(status((folder.path / "absent.glb").string() + " " + (folder.path / "o.relit").string()) ==
+        1);
+  CHECK(status(mannequin().string() + " " + (folder.path / "o.relit").string() +
+               " --fps nonsense") == 2);
+  CHECK(status(mannequin().string() + " --list-clips") == 0);
+  CHECK(status(mannequin().string() + " /dev/full --max-frames 1 --samples 8 --size 32") == 1);
+}
