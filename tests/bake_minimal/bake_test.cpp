@@ -10,6 +10,7 @@
 #include <functional>
 #include <numbers>
 
+#include "bake_minimal/plane_layout.hpp"
 #include "container/byte_source.hpp"
 #include "container/reader.hpp"
 #include "decoders/npy.hpp"
