@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cstring>
 #include <memory>
@@ -92,11 +93,11 @@ Result<Header> read_header(std::span<const std::uint8_t> bytes) {
   while (magic && !reader.failed()) {
     const std::string_view name = reader.text();
     if (name.empty()) break;
-    reader.text();  // the type
+    const std::string_view type = reader.text();
     Reader value(reader.take(reader.u32()));
-    if (name == "dataWindow") header.data = read_box(value);
-    if (name == "displayWindow") header.display = read_box(value);
-    if (name == "compression") {
+    if (name == "dataWindow" && type == "box2i") header.data = read_box(value);
+    if (name == "displayWindow" && type == "box2i") header.display = read_box(value);
+    if (name == "compression" && type == "compression") {
       const auto byte = value.take(1);
       if (!byte.empty()) header.compression = byte[0];
     }

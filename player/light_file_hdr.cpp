@@ -37,6 +37,8 @@ struct Source {
       const std::size_t count = std::min(wanted, left);
       std::memcpy(data, source.bytes.data() + source.position, count);
       source.position += count;
+      // Only the refilling of its buffer may end short; else it wants what it asks for.
+      if (count < wanted && wanted != sizeof(stbi__context::buffer_start)) source.exhausted = true;
       return static_cast<int>(count);
     }
     source.exhausted = true;
