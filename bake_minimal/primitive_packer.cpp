@@ -367,7 +367,7 @@ Result<PreparedPrimitive> prepare_primitive(const Scene& scene, std::uint32_t pr
       std::swap(out.indices[i + 1], out.indices[i + 2]);
     }
   }
-  if (still) move_to_world(out, world);
+  if (still && world != glm::mat4(1.0f)) move_to_world(out, world);
   if (!all_finite(out.positions)) {
     return fail(ErrorCode::kInvalid, place(p, primitive) + ": its node's matrix leads to infinity");
   }

@@ -56,7 +56,8 @@ glm::vec4 normalized(const glm::vec4& q) { return q / std::sqrt(glm::dot(q, q));
 /// FORMAT.md, "Pose packets": three components of 15 bits; which of x, y, z, w is left out (and not
 /// negative) stands in the top bits of the first two words.
 glm::vec4 unpack_rotation(const std::uint16_t* words, const PoseChannel& channel) {
-  const unsigned omitted = (words[0] >> kRotationBits) | (words[1] >> kRotationBits) << 1;
+  const auto top_bit = [](std::uint16_t word) { return unsigned{word} >> kRotationBits; };
+  const unsigned omitted = top_bit(words[0]) | top_bit(words[1]) << 1;
   glm::vec4 q(0.0f);
   float squares = 0;
   for (unsigned i = 0, component = 0; i < 3; ++i, ++component) {

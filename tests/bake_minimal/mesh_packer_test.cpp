@@ -272,9 +272,9 @@ TEST_CASE("octahedral normals are off by less than a degree") {
       back.x = (1 - std::abs(y)) * (x < 0 ? -1.0f : 1.0f);
       back.y = (1 - std::abs(x)) * (y < 0 ? -1.0f : 1.0f);
     }
-    // Half a step of 1/127 on both axes moves a point of the octahedron by at most √(2+2)/254 =
-    // 0.0079, and the octahedron is at least 1/√3 away: 0.0137 radians, 0.78°.
-    CHECK(glm::dot(glm::normalize(back), n) > std::cos(0.0137f));
+    // Half a step h = 1/254 on both axes moves a point of the octahedron by (h, h, -2h) at most,
+    // √6·h, and the octahedron is 1/√3 away at least: √18/254 = 0.0167 radians.
+    CHECK(glm::dot(glm::normalize(back), n) > std::cos(0.0168f));
   }
 }
 

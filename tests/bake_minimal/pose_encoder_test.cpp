@@ -302,7 +302,8 @@ TEST_CASE("rotations keep the bound for every kind of motion") {
   const double step = kFinestRotationStep;
   const QuantizedChannel channel = quantize_rotation(wild, step);
   for (std::size_t t = 0; t < wild.size(); ++t) {
-    const unsigned omitted = (channel.words[0][t] >> 15) | (channel.words[1][t] >> 15) << 1;
+    const auto top_bit = [&](std::size_t word) { return unsigned{channel.words[word][t]} >> 15; };
+    const unsigned omitted = top_bit(0) | top_bit(1) << 1;
     CHECK((channel.words[2][t] & 0x8000) == 0);
     glm::dvec4 q(0);
     double squares = 0;
