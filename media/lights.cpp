@@ -56,15 +56,15 @@ glm::dvec3 studio_soft(const glm::dvec3& d) {
 glm::dvec3 low_sun(const glm::dvec3& d) {
   const glm::dvec3 sun = towards(-62.0, 19.0);
   const double h = d.y, near = 0.5 + 0.5 * glm::dot(d, sun);
-  const glm::dvec3 zenith(0.085, 0.17, 0.36), middle(0.30, 0.36, 0.48);
-  const glm::dvec3 warm(1.25, 0.62, 0.26), cool(0.42, 0.36, 0.42);
+  const glm::dvec3 zenith(0.12, 0.23, 0.46), middle(0.36, 0.43, 0.56);
+  const glm::dvec3 warm(1.25, 0.62, 0.26), cool(0.50, 0.43, 0.50);
   const glm::dvec3 rim = mix(cool, warm, near * near);
   glm::dvec3 sky =
       mix(mix(rim, middle, smooth_step(-0.02, 0.42, h)), zenith, smooth_step(0.12, 0.95, h));
-  sky += glm::dvec3(4.3, 2.35, 0.95) * glow(d, sun, 26.0);
-  sky += glm::dvec3(15.0, 9.6, 4.9) * glow(d, sun, 7.5);
+  sky += glm::dvec3(3.1, 1.72, 0.72) * glow(d, sun, 33.0);
+  sky += glm::dvec3(12.0, 7.8, 4.1) * glow(d, sun, 7.5);
   const glm::dvec3 ground =
-      mix(glm::dvec3(0.14, 0.105, 0.085), glm::dvec3(0.30, 0.19, 0.115), near) *
+      mix(glm::dvec3(0.20, 0.155, 0.13), glm::dvec3(0.36, 0.235, 0.15), near) *
       (1.0 - 0.35 * smooth_step(0.0, -0.9, h));
   return mix(ground, sky, smooth_step(-0.07, 0.035, h));
 }
@@ -72,14 +72,14 @@ glm::dvec3 low_sun(const glm::dvec3& d) {
 // Teal on one side and orange running into magenta on the other, over a dim blue-grey room.
 glm::dvec3 coloured_pair(const glm::dvec3& d) {
   const double h = d.y;
-  glm::dvec3 c = mix(glm::dvec3(0.060, 0.058, 0.072), glm::dvec3(0.030, 0.032, 0.050),
+  glm::dvec3 c = mix(glm::dvec3(0.125, 0.120, 0.150), glm::dvec3(0.070, 0.075, 0.110),
                      smooth_step(-0.3, 0.9, h));
-  c = mix(c, glm::dvec3(0.075, 0.062, 0.066), smooth_step(0.05, -0.35, h));
-  c += glm::dvec3(0.22, 3.1, 3.5) * softbox(d, 78.0, 24.0, 0.58, 0.72);
-  c += glm::dvec3(0.03, 0.34, 0.40) * glow(d, towards(78.0, 18.0), 38.0);
-  c += glm::dvec3(5.6, 1.75, 0.30) * softbox(d, -82.0, 30.0, 0.50, 0.55);
-  c += glm::dvec3(2.1, 0.12, 0.95) * softbox(d, -128.0, 8.0, 0.55, 0.65);
-  c += glm::dvec3(0.50, 0.12, 0.10) * glow(d, towards(-95.0, 18.0), 40.0);
+  c = mix(c, glm::dvec3(0.150, 0.130, 0.140), smooth_step(0.05, -0.35, h));
+  c += glm::dvec3(0.18, 2.3, 2.6) * softbox(d, 78.0, 24.0, 0.58, 0.72);
+  c += glm::dvec3(0.06, 0.50, 0.58) * glow(d, towards(78.0, 18.0), 42.0);
+  c += glm::dvec3(4.1, 1.30, 0.24) * softbox(d, -82.0, 30.0, 0.50, 0.55);
+  c += glm::dvec3(1.6, 0.10, 0.75) * softbox(d, -128.0, 8.0, 0.55, 0.65);
+  c += glm::dvec3(0.70, 0.20, 0.16) * glow(d, towards(-95.0, 18.0), 44.0);
   c += glm::dvec3(0.20, 0.19, 0.22) * glow(d, towards(0.0, 80.0), 35.0);
   return c;
 }

@@ -53,7 +53,7 @@ Surface wrap() {
                                  {1.125, 0.1095, 0.0900, 0.0865, 0, 0, 2.1},
                                  {1.155, 0.1160, 0.0955, 0.0905, 0, 0, 2.15}},
                                 0.0);
-  Surface s{.name = "sash", .matter = Matter::kCloth, .columns = 46, .tolerance_m = 0.0024};
+  Surface s{.name = "sash", .matter = Matter::kCloth, .columns = 44, .tolerance_m = 0.0024};
   s.point = [](double t, double angle) {
     constexpr double kLip = 0.06;
     const double a = angle + kPi;

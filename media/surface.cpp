@@ -257,6 +257,9 @@ Patch tessellate(const Surface& surface) {
     for (std::uint32_t c = 0; c + 1 < stride; ++c) {
       const std::uint32_t a = r * stride + c, b = a + 1, d = a + stride, e = d + 1;
       const auto add = [&](std::uint32_t i, std::uint32_t j, std::uint32_t k) {
+        const glm::dvec3 p(patch.vertices[i].position), q(patch.vertices[j].position),
+            s(patch.vertices[k].position);
+        if (glm::length(glm::cross(q - p, s - p)) < 1e-10) return;
         patch.triangles.push_back(sign > 0.0 ? std::array{i, j, k} : std::array{i, k, j});
         patch.matter.push_back(matter);
       };

@@ -50,7 +50,7 @@ struct Surface {
   std::vector<Band> bands{};
   Unroll unroll = Unroll::kStrip;
   int columns = 20;
-  double tolerance_m = 0.0014;  ///< how far a ring may lie from the chord of its neighbours
+  double tolerance_m = 0.0017;  ///< how far a ring may lie from the chord of its neighbours
   double step_m = 0.05;         ///< between rings, at most
   double texel_weight = 1.0;    ///< linear density of light-map texels against the others'
   double narrowest = 0.35;      ///< of a strip, against its widest row

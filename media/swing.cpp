@@ -105,20 +105,31 @@ void step_chain(const Drive& drive, double wind, double dt, Chain& chain) {
   for (std::size_t k = 1; k < kPoints; ++k) keep_out(drive, chain.now[k], chain.before[k]);
 }
 
-// Directions of the segments become joint rotations; the cloth keeps facing the way the knot does.
-void write_tail(const Chain& chain, const std::array<glm::dvec3, kPoints>& points, Pose& pose) {
+// The way a segment's cloth faces: as the knot does, but where the thigh is close, away from it.
+glm::dvec3 facing_at(const Drive& drive, const glm::dvec3& middle, int first) {
+  const glm::dvec3 own = drive.pelvis_turn * tail_facing(first);
+  const glm::dvec3 to = middle - drive.hip;
+  const double along = glm::dot(to, drive.thigh_axis);
+  const glm::dvec3 off = to - along * drive.thigh_axis;
+  const double distance = glm::length(off);
+  const double gap = distance - thigh_radius(std::clamp(along, 0.0, kBody.thigh)) - kClearance;
+  const double near = smooth_step(0.06, 0.005, gap) * smooth_step(-0.03, 0.06, along);
+  return glm::normalize(glm::mix(own, off / std::max(distance, 1e-6), near));
+}
+
+// Directions of the segments become joint rotations.
+void write_tail(const Drive& drive, int first, const std::array<glm::dvec3, kPoints>& points,
+                Pose& pose) {
   glm::dquat parent = pose.local[kPelvis];
-  const glm::dvec3 side = glm::cross(glm::dvec3(0.0, 1.0, 0.0), tail_facing(chain.first));
+  const glm::dvec3 up(0.0, 1.0, 0.0), rest_side = glm::cross(up, tail_facing(first));
+  const glm::dquat rest = from_axes(rest_side, up, glm::cross(rest_side, up));
   for (std::size_t k = 0; k < kTailJoints; ++k) {
     const glm::dvec3 y = glm::normalize(points[k] - points[k + 1]);
-    const glm::dvec3 x0 = pose.local[kPelvis] * side;
-    const glm::dvec3 x = glm::normalize(x0 - glm::dot(x0, y) * y);
-    // The joint's own axes are the model's at rest: undo the rest frame of the ribbon.
-    const glm::dquat ribbon = from_axes(x, y, glm::cross(x, y));
-    const glm::dquat ribbon_rest =
-        from_axes(side, {0, 1, 0}, glm::cross(side, glm::dvec3(0, 1, 0)));
-    const glm::dquat world = glm::normalize(ribbon * glm::conjugate(ribbon_rest));
-    pose.local[static_cast<std::size_t>(chain.first) + k] =
+    const glm::dvec3 x =
+        glm::normalize(glm::cross(y, facing_at(drive, 0.5 * (points[k] + points[k + 1]), first)));
+    const glm::dquat world =
+        glm::normalize(from_axes(x, y, glm::cross(x, y)) * glm::conjugate(rest));
+    pose.local[static_cast<std::size_t>(first) + k] =
         glm::normalize(glm::conjugate(parent) * world);
     parent = world;
   }
@@ -155,7 +166,7 @@ void swing_tails(const Walk& walk, std::vector<Pose>& poses) {
       const double f = static_cast<double>(key) / static_cast<double>(poses.size());
       std::array<glm::dvec3, kPoints> points = record[key];
       for (std::size_t k = 0; k < kPoints; ++k) points[k] += f * (record[0][k] - chain.now[k]);
-      write_tail(chain, points, poses[key]);
+      write_tail(drive_at(poses, key, 0.0), first, points, poses[key]);
     }
   }
 }
