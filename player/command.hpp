@@ -11,6 +11,7 @@
 #include "container/base/result.hpp"
 #include "player/clip_reader.hpp"
 #include "player/light.hpp"
+#include "player/scene_view.hpp"
 
 /// What the commands of `relit` share. Messages go to standard error, data and JSON to standard
 /// output.
@@ -42,6 +43,9 @@ void add_light_options(CLI::App& command, LightArguments& arguments);
 /// Loads the light and warns of negative radiance.
 [[nodiscard]] Result<LoadedLight> load_light(const LightArguments& arguments, int order);
 
+/// --camera, --exposure, --tone-map, --background and --background-blur.
+void add_view_options(CLI::App& command, ViewOptions& view, std::string& camera);
+
 /// "7", "0-99": frames first..last of a clip of `count` frames.
 struct FrameRange {
   std::uint64_t first = 0, last = 0;
@@ -56,5 +60,6 @@ Command add_info(CLI::App& app);
 Command add_dump(CLI::App& app);
 Command add_light(CLI::App& app);
 Command add_render(CLI::App& app);
+Command add_play(CLI::App& app);
 
 }  // namespace relit::player

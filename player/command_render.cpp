@@ -1,25 +1,21 @@
 // SPDX-License-Identifier: MIT
 #include <charconv>
-#include <cmath>
 #include <cstdio>
 
 #include "decoders/npy.hpp"
 #include "gles/picture.hpp"
-#include "player/camera.hpp"
-#include "player/character.hpp"
 #include "player/command.hpp"
 #include "player/picture_writer.hpp"
-#include "player/relighter.hpp"
+#include "player/scene_view.hpp"
 
 namespace relit::player {
 namespace {
 
 struct Arguments {
-  std::string source, output, clip, frame, frames, camera, exposure = "auto", background = "light",
-                                                           sheet;
-  std::string backend = "egl", size = "512x512", tone = "neutral";
+  std::string source, output, clip, frame, frames, camera, sheet, backend = "egl", size = "512x512";
   LightArguments light;
-  double time_s = -1, blur_deg = 0;
+  ViewOptions view;
+  double time_s = -1;
   int layers = -1, threads = 1, samples = 4;
   bool lightmap = false;
 };
@@ -42,69 +38,6 @@ Result<Size> parse_size(const std::string& text, const char* option, int largest
   return fail(ErrorCode::kInvalid, std::string(option) + " " + text +
                                        ": the form is WIDTHxHEIGHT, at most " +
                                        std::to_string(largest) + " each");
-}
-
-double luminance(const std::array<double, 3>& rgb) {
-  return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
-}
-
-// The exposure under which a mid-grey surface in the mean of the light comes out as mid-grey, a
-// little up.
-Result<float> choose_exposure(const std::string& text, const decoders::Light& light) {
-  if (text == "auto") {
-    const double mean = luminance(light.sh.front()) * 0.28209479177387814;
-    return mean > 0 ? static_cast<float>(0.8 / mean) : 1.0f;
-  }
-  double stops = 0;
-  const auto [rest, error] = std::from_chars(text.data(), text.data() + text.size(), stops);
-  if (error != std::errc() || rest != text.data() + text.size() || !(std::abs(stops) <= 60)) {
-    return fail(
-        ErrorCode::kInvalid,
-        "--exposure " + text + ": it must be auto, or stops such as -1.5 (radiance × 2^stops)");
-  }
-  return static_cast<float>(std::exp2(stops));
-}
-
-Result<gles::ToneMap> parse_tone(const std::string& text) {
-  if (text == "linear") return gles::ToneMap::kLinear;
-  if (text == "filmic") return gles::ToneMap::kFilmic;
-  if (text == "neutral") return gles::ToneMap::kNeutral;
-  return fail(ErrorCode::kInvalid, "--tone-map " + text + ": it must be neutral, filmic or linear");
-}
-
-// Turned lights: the coefficients were turned when they were loaded, the picture turns on drawing.
-Status set_background(const Arguments& arguments, const LoadedLight& light,
-                      gles::BackgroundRenderer& renderer) {
-  gles::Background background;
-  std::vector<std::array<float, 3>> harmonics;
-  const std::string& kind = arguments.background;
-  if (kind == "light" && light.environment) {
-    background.kind = gles::Background::Kind::kEnvironment;
-    background.environment = {light.environment->width, light.environment->height,
-                              light.environment->rgb};
-    background.blur_rad = static_cast<float>(glm::radians(arguments.blur_deg));
-    background.max_side = 512;
-    renderer.set_rotation(static_cast<float>(light.environment_rotation_rad));
-  } else if (kind == "light" || kind == "sh") {
-    background.kind = gles::Background::Kind::kHarmonics;
-    for (const auto& row : light.light.sh) {
-      harmonics.push_back(
-          {static_cast<float>(row[0]), static_cast<float>(row[1]), static_cast<float>(row[2])});
-    }
-    background.harmonics = harmonics;
-  } else if (kind.size() == 7 && kind[0] == '#' &&
-             kind.find_first_not_of("0123456789abcdefABCDEF", 1) == std::string::npos) {
-    background.kind = gles::Background::Kind::kColor;
-    for (std::size_t c = 0; c < 3; ++c) {
-      background.top[c] =
-          static_cast<float>(std::stoi(kind.substr(1 + 2 * c, 2), nullptr, 16)) / 255.0f;
-    }
-  } else if (kind != "none") {
-    return fail(
-        ErrorCode::kInvalid,
-        "--background " + kind + ": it must be light, sh, none or a colour such as #202428");
-  }
-  return renderer.set(background);
 }
 
 Result<FrameRange> chosen_frames(const Arguments& arguments, const container::ClipRecord& clip) {
@@ -133,14 +66,6 @@ Result<FrameRange> chosen_frames(const Arguments& arguments, const container::Cl
   return range;
 }
 
-std::vector<std::uint8_t> decoded_layers(const ClipReader& clip, int layers) {
-  std::vector<std::uint8_t> decoded(clip.layers().size(), 1);
-  for (std::size_t l = 0; l < decoded.size(); ++l) {
-    if (layers >= 0 && l >= static_cast<std::size_t>(layers)) decoded[l] = 0;
-  }
-  return decoded;
-}
-
 Status render_lightmap(const Arguments& arguments, ClipReader& clip, const LoadedLight& light,
                        Backend backend) {
   GlBackend gl;
@@ -167,7 +92,7 @@ Status render_lightmap(const Arguments& arguments, ClipReader& clip, const Loade
   return writer.commit();
 }
 
-// Everything that draws a frame of a clip into a picture.
+// A scene off the screen.
 class PictureRenderer {
  public:
   static Result<std::unique_ptr<PictureRenderer>> create(const Arguments& arguments,
@@ -175,28 +100,29 @@ class PictureRenderer {
                                                          const LoadedLight& light, Backend backend,
                                                          Size size) {
     std::unique_ptr<PictureRenderer> self(new PictureRenderer);
+    ViewOptions options = arguments.view;
+    options.layers = arguments.layers;
+    options.composite_on_gpu = backend != Backend::kCpu;
+    if (!arguments.camera.empty()) {
+      RELIT_ASSIGN(options.camera, parse_camera(arguments.camera));
+    }
+    self->camera_ = options.camera;
     RELIT_ASSIGN(self->gl_, open_backend(backend));
-    const gles::Device& device = *self->gl_.device;
-    RELIT_ASSIGN(self->relighter_,
-                 Relighter::create(clip.model(), clip.layers(), &device, backend != Backend::kCpu));
-    RELIT_TRY(self->relighter_->set_light(light.light, decoded_layers(clip, arguments.layers)));
-    RELIT_ASSIGN(self->character_, Character::create(clip, device));
-    for (const std::string& warning : self->character_->warnings())
+    RELIT_ASSIGN(self->scene_, SceneView::create(clip, *self->gl_.device, options));
+    for (const std::string& warning : self->scene_->warnings())
       std::fprintf(stderr, "relit: warning: %s\n", warning.c_str());
-    RELIT_TRY(set_background(arguments, light, self->character_->renderer().background()));
-    RELIT_ASSIGN(auto framebuffer,
-                 gles::Framebuffer::create(device, {size.width, size.height, arguments.samples}));
+    RELIT_TRY(self->scene_->set_light(light));
+    RELIT_ASSIGN(
+        auto framebuffer,
+        gles::Framebuffer::create(*self->gl_.device, {size.width, size.height, arguments.samples}));
     self->framebuffer_ = std::make_unique<gles::Framebuffer>(std::move(framebuffer));
-    RELIT_TRY(self->set_view(arguments, clip, light));
     return self;
   }
 
   Status draw(const ClipFrame& frame, std::span<std::uint8_t> rgba) {
-    RELIT_TRY(relighter_->composite(frame.planes));
-    RELIT_ASSIGN(const gles::LightMap light_map, relighter_->texture());
-    RELIT_TRY(character_->pose(frame.pose));
+    RELIT_TRY(scene_->set_frame(frame));
     framebuffer_->bind();
-    RELIT_TRY(character_->renderer().draw(view_, light_map));
+    RELIT_TRY(scene_->draw(camera_, framebuffer_->draw_width(), framebuffer_->draw_height()));
     RELIT_TRY(framebuffer_->resolve());
     return framebuffer_->read_back(rgba);
   }
@@ -204,28 +130,10 @@ class PictureRenderer {
  private:
   PictureRenderer() = default;
 
-  Status set_view(const Arguments& arguments, const ClipReader& clip, const LoadedLight& light) {
-    OrbitCamera camera;
-    if (!arguments.camera.empty()) {
-      RELIT_ASSIGN(camera, parse_camera(arguments.camera));
-    }
-    const auto& low = clip.clip().bounds_min;
-    const auto& high = clip.clip().bounds_max;
-    const double aspect = static_cast<double>(framebuffer_->width()) / framebuffer_->height();
-    const CameraMatrices matrices =
-        camera_matrices(camera, {low[0], low[1], low[2]}, {high[0], high[1], high[2]}, aspect);
-    view_.view = matrices.view, view_.projection = matrices.projection;
-    RELIT_ASSIGN(view_.exposure, choose_exposure(arguments.exposure, light.light));
-    RELIT_ASSIGN(view_.tone_map, parse_tone(arguments.tone));
-    view_.width = framebuffer_->draw_width(), view_.height = framebuffer_->draw_height();
-    return {};
-  }
-
-  GlBackend gl_;
-  std::unique_ptr<Relighter> relighter_;
-  std::unique_ptr<Character> character_;
+  GlBackend gl_;  // goes last
+  std::unique_ptr<SceneView> scene_;
   std::unique_ptr<gles::Framebuffer> framebuffer_;
-  gles::View view_;
+  OrbitCamera camera_;
 };
 
 // Pictures side by side in one.
@@ -327,15 +235,7 @@ Command add_render(CLI::App& app) {
       ->check(CLI::NonNegativeNumber);
   command->add_option("--clip", a->clip, "by name or number");
   command->add_option("--size", a->size, "of the picture")->capture_default_str();
-  command->add_option("--camera", a->camera,
-                      "orbit:AZIMUTH,ELEVATION[,DISTANCE], degrees and metres");
-  command->add_option("--exposure", a->exposure, "auto, or stops: radiance × 2^stops")
-      ->capture_default_str();
-  command->add_option("--tone-map", a->tone, "neutral, filmic or linear")->capture_default_str();
-  command->add_option("--background", a->background, "light, sh, none (transparent) or #rrggbb")
-      ->capture_default_str();
-  command->add_option("--background-blur", a->blur_deg, "soft focus of the background, degrees")
-      ->check(CLI::Range(0.0, 90.0));
+  add_view_options(*command, a->view, a->camera);
   command->add_option("--backend", a->backend, "egl, egl-es2, egl-es2-mediump, osmesa or cpu")
       ->capture_default_str();
   command->add_option("--layers", a->layers,

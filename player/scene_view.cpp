@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: MIT
+#include "player/scene_view.hpp"
+
+#include <charconv>
+#include <cmath>
+#include <glm/gtc/constants.hpp>
+
+namespace relit::player {
+namespace {
+
+constexpr double kMeanOfY0 = 0.28209479177387814;
+
+double luminance(const std::array<double, 3>& rgb) {
+  return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
+}
+
+// The exposure under which a white surface in the mean of the light comes out a little below white.
+Result<float> choose_exposure(const std::string& text, const decoders::Light& light) {
+  if (text == "auto") {
+    const double mean = luminance(light.sh.front()) * kMeanOfY0;
+    return mean > 0 ? static_cast<float>(0.8 / mean) : 1.0f;
+  }
+  double stops = 0;
+  const auto [rest, error] = std::from_chars(text.data(), text.data() + text.size(), stops);
+  if (error != std::errc() || rest != text.data() + text.size() || !(std::abs(stops) <= 60)) {
+    return fail(
+        ErrorCode::kInvalid,
+        "--exposure " + text + ": it must be auto, or stops such as -1.5 (radiance × 2^stops)");
+  }
+  return static_cast<float>(std::exp2(stops));
+}
+
+Result<gles::ToneMap> parse_tone_map(const std::string& text) {
+  if (text == "linear") return gles::ToneMap::kLinear;
+  if (text == "filmic") return gles::ToneMap::kFilmic;
+  if (text == "neutral") return gles::ToneMap::kNeutral;
+  return fail(ErrorCode::kInvalid, "--tone-map " + text + ": it must be neutral, filmic or linear");
+}
+
+bool is_color(const std::string& text) {
+  return text.size() == 7 && text[0] == '#' &&
+         text.find_first_not_of("0123456789abcdefABCDEF", 1) == std::string::npos;
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> decoded_layers(const ClipReader& clip, int layers) {
+  std::vector<std::uint8_t> decoded(clip.layers().size(), 1);
+  for (std::size_t l = 0; l < decoded.size(); ++l) {
+    if (layers >= 0 && l >= static_cast<std::size_t>(layers)) decoded[l] = 0;
+  }
+  return decoded;
+}
+
+Result<std::unique_ptr<SceneView>> SceneView::create(const ClipReader& clip,
+                                                     const gles::Device& device,
+                                                     const ViewOptions& options) {
+  std::unique_ptr<SceneView> scene(new SceneView(clip, options));
+  const std::string& background = options.background;
+  if (background != "light" && background != "sh" && background != "none" &&
+      !is_color(background)) {
+    return fail(
+        ErrorCode::kInvalid,
+        "--background " + background + ": it must be light, sh, none or a colour such as #202428");
+  }
+  RELIT_ASSIGN(scene->view_.tone_map, parse_tone_map(options.tone_map));
+  RELIT_ASSIGN(scene->relighter_,
+               Relighter::create(clip.model(), clip.layers(), &device, options.composite_on_gpu));
+  RELIT_ASSIGN(scene->character_, Character::create(clip, device));
+  return scene;
+}
+
+Status SceneView::fold(const decoders::Light& light) {
+  return relighter_->set_light(light, decoded_layers(clip_, options_.layers));
+}
+
+Status SceneView::set_light(const LoadedLight& light) {
+  RELIT_ASSIGN(view_.exposure, choose_exposure(options_.exposure, light.light));
+  RELIT_TRY(fold(light.light));
+  return set_background(light);
+}
+
+Status SceneView::turn_light(const LoadedLight& light, double turn_rad) {
+  decoders::Light turned = light.light;
+  decoders::rotate_light_y(turned, turn_rad);
+  RELIT_TRY(fold(turned));
+  character_->renderer().background().set_rotation(
+      static_cast<float>(light.environment_rotation_rad + turn_rad));
+  return {};
+}
+
+Status SceneView::set_background(const LoadedLight& light) {
+  gles::Background background;
+  std::vector<std::array<float, 3>> harmonics;
+  gles::BackgroundRenderer& renderer = character_->renderer().background();
+  renderer.set_rotation(0);
+  const std::string& kind = options_.background;
+  if (kind == "light" && light.environment) {
+    background.kind = gles::Background::Kind::kEnvironment;
+    background.environment = {light.environment->width, light.environment->height,
+                              light.environment->rgb};
+    background.blur_rad = static_cast<float>(glm::radians(options_.background_blur_deg));
+    background.max_side = 512;
+    renderer.set_rotation(static_cast<float>(light.environment_rotation_rad));
+  } else if (kind == "light" || kind == "sh") {
+    background.kind = gles::Background::Kind::kHarmonics;
+    for (const auto& row : light.light.sh) {
+      harmonics.push_back(
+          {static_cast<float>(row[0]), static_cast<float>(row[1]), static_cast<float>(row[2])});
+    }
+    background.harmonics = harmonics;
+  } else if (is_color(kind)) {
+    background.kind = gles::Background::Kind::kColor;
+    for (std::size_t c = 0; c < 3; ++c) {
+      background.top[c] =
+          static_cast<float>(std::stoi(kind.substr(1 + 2 * c, 2), nullptr, 16)) / 255.0f;
+    }
+  }
+  return renderer.set(background);
+}
+
+Status SceneView::set_frame(const ClipFrame& frame) {
+  RELIT_TRY(relighter_->composite(frame.planes));
+  return character_->pose(frame.pose);
+}
+
+Status SceneView::draw(const OrbitCamera& camera, int width, int height) {
+  RELIT_ASSIGN(const gles::LightMap light_map, relighter_->texture());
+  const auto& low = clip_.clip().bounds_min;
+  const auto& high = clip_.clip().bounds_max;
+  const double aspect = static_cast<double>(width) / height;
+  const CameraMatrices matrices =
+      camera_matrices(camera, {low[0], low[1], low[2]}, {high[0], high[1], high[2]}, aspect);
+  view_.view = matrices.view, view_.projection = matrices.projection;
+  view_.width = width, view_.height = height;
+  return character_->renderer().draw(view_, light_map);
+}
+
+}  // namespace relit::player
