@@ -186,7 +186,8 @@ Status BackgroundRenderer::draw_sky(const View& view) {
   const glm::mat3 rays = ray_matrix(view, rotation_rad_);
   gl.UniformMatrix3fv(sky->rays, 1, GL_FALSE, glm::value_ptr(rays));
   const float range = half_float_ ? 1.0f : kRootRange * kRootRange;
-  gl.Uniform1f(sky->scale, std::min(cube_scale_ * view.exposure * range, 1e30f));
+  const float most = device_->profile() == Profile::kEs2Mediump ? 60000.0f : 1e30f;
+  gl.Uniform1f(sky->scale, std::min(cube_scale_ * view.exposure * range, most));
   gl.BindTexture(GL_TEXTURE_CUBE_MAP, cube_.name());
   device_->draw_fullscreen();
   gl.BindTexture(GL_TEXTURE_CUBE_MAP, 0);

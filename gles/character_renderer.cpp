@@ -238,7 +238,10 @@ Status CharacterRenderer::draw_with_material(const Mesh& mesh, const View& view,
   gl.UniformMatrix4fv(shader->view_projection, 1, GL_FALSE, glm::value_ptr(view_projection_));
   gl.Uniform4f(shader->base_color, material.base_color[0], material.base_color[1],
                material.base_color[2], material.base_color[3]);
-  gl.Uniform1f(shader->light_scale, view.exposure * map.scale * map.magnitude);
+  const float scale = view.exposure * map.scale * map.magnitude;
+  // A half float that overflows would make black NaN.
+  const bool half = device_.profile() == Profile::kEs2Mediump;
+  gl.Uniform1f(shader->light_scale, half ? std::min(scale, 60000.0f) : scale);
   const auto width = static_cast<float>(map.width);
   const auto height = static_cast<float>(map.height);
   gl.Uniform4f(shader->light_map_size, width, height, 1 / width, 1 / height);

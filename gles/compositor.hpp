@@ -41,8 +41,10 @@ class Compositor {
 
   /// Composites the planes uploaded last. Errors: kInvalid (count of weights, a number that is not
   /// finite, a plane with a weight that was not uploaded), kUnsupported for a light with a
-  /// prediction plane: s · E(N) needs a map of normals in texture space, which this class does not
-  /// have, so the CPU composites such models.
+  /// prediction plane, whose models the CPU composites. (s · E(N) would be one more additive pass
+  /// at the end of this function: the posed meshes drawn in light-map coordinates, with their
+  /// normals as an attribute, s's sheet as a texture and FoldedLight::irradiance as sixteen
+  /// uniforms.)
   Result<LightMap> composite(const FoldedLight& light);
 
   /// Reads the last composite into [3][height][width], not multiplied by the light's magnitude:

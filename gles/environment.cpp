@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <numbers>
 
 namespace relit::gles {
@@ -61,55 +62,41 @@ Equirect shrink(const EnvironmentView& source, int width, int height) {
   return out;
 }
 
-std::vector<float> gaussian(float sigma, int limit) {
-  const int radius = std::min(limit, static_cast<int>(std::ceil(3 * sigma)));
-  std::vector<float> kernel(static_cast<std::size_t>(2 * radius + 1));
-  float sum = 0;
-  for (int i = -radius; i <= radius; ++i) {
-    const float t = static_cast<float>(i) / std::max(sigma, 1e-6f);
-    sum += kernel[static_cast<std::size_t>(i + radius)] = std::exp(-0.5f * t * t);
-  }
-  for (float& k : kernel) k /= sum;
-  return kernel;
-}
-
-// sin θ of a row: the size of its pixels on the sphere.
-float row_size(const Equirect& map, int y) {
-  return std::sin(kPi * (static_cast<float>(y) + 0.5f) / static_cast<float>(map.height));
-}
-
-// Along the meridians, through the poles, weighted by the pixels' sizes; then along the parallels,
-// where an angle takes 1/sin θ as many pixels. Not exactly a Gaussian on the sphere near the poles,
-// but smooth there.
+// exp((d·d' - 1)/σ²), the Gaussian's like on the sphere, over the pixels' solid angles. Its weights
+// depend on the two rows and the distance between the columns only.
 void blur(Equirect& map, float sigma_rad) {
-  Equirect vertical = map;
-  const std::vector<float> kernel =
-      gaussian(sigma_rad / kPi * static_cast<float>(map.height), map.height - 1);
-  const int radius = static_cast<int>(kernel.size() / 2);
+  const Equirect source = map;
+  const float cut = 4.5f * sigma_rad * sigma_rad;  // of 1 - d·d': three deviations
+  const auto height = static_cast<float>(map.height);
+  std::vector<float> weights(static_cast<std::size_t>(map.width / 2 + 1));
   for (int y = 0; y < map.height; ++y) {
-    for (int x = 0; x < map.width; ++x) {
-      glm::vec3 sum(0.0f);
-      float weights = 0;
-      for (int i = -radius; i <= radius; ++i) {
-        const float weight =
-            kernel[static_cast<std::size_t>(i + radius)] * std::abs(row_size(map, y + i));
-        sum += weight * map.across(x, y + i);
-        weights += weight;
+    const float theta = kPi * (static_cast<float>(y) + 0.5f) / height;
+    glm::vec3* out = map.texels.data() + static_cast<std::ptrdiff_t>(y) * map.width;
+    std::fill(out, out + map.width, glm::vec3(0.0f));
+    float total = 0;
+    for (int j = 0; j < map.height; ++j) {
+      const float other = kPi * (static_cast<float>(j) + 0.5f) / height;
+      int reach = 0;
+      for (int dx = 0; dx <= map.width / 2; ++dx) {
+        const float turn = 2 * kPi * static_cast<float>(dx) / static_cast<float>(map.width);
+        const float away = 1 - std::cos(theta) * std::cos(other) -
+                           std::sin(theta) * std::sin(other) * std::cos(turn);
+        if (away > cut) break;
+        weights[static_cast<std::size_t>(reach++)] =
+            std::sin(other) * std::exp(-away / (sigma_rad * sigma_rad));
       }
-      vertical.texels[static_cast<std::size_t>(y * map.width + x)] = sum / weights;
+      for (int dx = 0; dx < reach; ++dx) {
+        const float weight = weights[static_cast<std::size_t>(dx)];
+        // Straight ahead and straight behind there is one column, elsewhere one on either side.
+        const bool single = dx == 0 || 2 * dx == map.width;
+        total += single ? weight : 2 * weight;
+        for (int x = 0; x < map.width; ++x) {
+          out[x] += weight * source.at((x + dx) % map.width, j);
+          if (!single) out[x] += weight * source.at((x + map.width - dx) % map.width, j);
+        }
+      }
     }
-  }
-  for (int y = 0; y < map.height; ++y) {
-    const float row = row_size(map, y);
-    const std::vector<float> across =
-        gaussian(sigma_rad / row / (2 * kPi) * static_cast<float>(map.width), map.width / 2);
-    const int reach = static_cast<int>(across.size() / 2);
-    for (int x = 0; x < map.width; ++x) {
-      glm::vec3 sum(0.0f);
-      for (int i = -reach; i <= reach; ++i)
-        sum += across[static_cast<std::size_t>(i + reach)] * vertical.across(x + i, y);
-      map.texels[static_cast<std::size_t>(y * map.width + x)] = sum;
-    }
+    for (int x = 0; x < map.width; ++x) out[x] /= total;
   }
 }
 

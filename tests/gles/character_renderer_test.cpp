@@ -394,14 +394,15 @@ TEST_CASE("a view draws only within its rectangle, and state is put back", "[gle
     CHECK(after == before);
     CHECK(viewport[0] == 1);
     CHECK(viewport[3] == 4);
-    for (const GLenum name : {GL_CURRENT_PROGRAM, GL_ARRAY_BUFFER_BINDING, GL_TEXTURE_BINDING_2D,
-                              GL_ELEMENT_ARRAY_BUFFER_BINDING}) {
+    constexpr GLenum kBindings[] = {GL_CURRENT_PROGRAM, GL_ARRAY_BUFFER_BINDING,
+                                    GL_TEXTURE_BINDING_2D, GL_ELEMENT_ARRAY_BUFFER_BINDING};
+    for (const GLenum name : kBindings) {
       GLint bound = -1;
       gl.GetIntegerv(name, &bound);
       CHECK(bound == 0);
     }
-    for (const GLenum name : {GL_BLEND, GL_DEPTH_TEST, GL_CULL_FACE, GL_SCISSOR_TEST})
-      CHECK(gl.IsEnabled(name) == GLboolean{GL_FALSE});
+    constexpr GLenum kSwitches[] = {GL_BLEND, GL_DEPTH_TEST, GL_CULL_FACE, GL_SCISSOR_TEST};
+    for (const GLenum name : kSwitches) CHECK(gl.IsEnabled(name) == GLboolean{GL_FALSE});
     Stage::require(stage.framebuffer.resolve());
     Picture picture{kSide, kSide, std::vector<std::uint8_t>(4 * kSide * kSide)};
     Stage::require(stage.framebuffer.read_back(picture.rgba));
