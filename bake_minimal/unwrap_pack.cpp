@@ -280,23 +280,37 @@ class Packer {
   std::optional<std::vector<Placed>> try_nested(double scale) const {
     const std::size_t count = shapes_.size();
     std::vector<Candidates> turned(count);
-    std::vector<std::size_t> cells(count, 0);
+    std::vector<glm::dvec2> sizes(count);
     for (std::size_t i = 0; i < count; ++i) {
       for (const glm::dvec2& turn : turns_) turned[i].push_back(footprint(i, scale, turn));
       const auto any = std::find_if(turned[i].begin(), turned[i].end(),
                                     [](const auto& candidate) { return candidate.has_value(); });
       if (any == turned[i].end()) return std::nullopt;
-      const glm::ivec2 size = (*any)->footprint.size;
-      cells[i] = static_cast<std::size_t>(std::max(size.x, size.y)) *
-                 static_cast<std::size_t>(size.x + size.y);
+      sizes[i] = glm::dvec2((*any)->footprint.size);
     }
     if (!room_for(turned)) return std::nullopt;
-    std::vector<std::size_t> order(count);
-    std::iota(order.begin(), order.end(), std::size_t{0});
-    std::stable_sort(order.begin(), order.end(),
-                     [&](std::size_t a, std::size_t b) { return cells[a] > cells[b]; });
+    // Large before small, in more than one sense where that is cheap.
+    const int senses = count <= 4 * kFewShapes ? 3 : 1;
+    for (int sense = 0; sense < senses; ++sense) {
+      const auto weight = [&](std::size_t i) {
+        const double longest = std::max(sizes[i].x, sizes[i].y);
+        return sense == 0   ? longest * (sizes[i].x + sizes[i].y)
+               : sense == 1 ? sizes[i].x * sizes[i].y
+                            : longest;
+      };
+      std::vector<std::size_t> order(count);
+      std::iota(order.begin(), order.end(), std::size_t{0});
+      std::stable_sort(order.begin(), order.end(),
+                       [&](std::size_t a, std::size_t b) { return weight(a) > weight(b); });
+      if (auto placed = place_all(turned, order)) return placed;
+    }
+    return std::nullopt;
+  }
+
+  std::optional<std::vector<Placed>> place_all(const std::vector<Candidates>& turned,
+                                               const std::vector<std::size_t>& order) const {
     Grid covered(grid_size_), read(grid_size_);
-    std::vector<Placed> placed(count);
+    std::vector<Placed> placed(turned.size());
     for (const std::size_t i : order) {
       if (!place(turned[i], covered, read, placed[i])) return std::nullopt;
     }
@@ -329,11 +343,11 @@ class Packer {
   }
 
   // The lowest place, then the leftmost, over all turns.
-  bool place(Candidates& turned, Grid& covered, Grid& read, Placed& out) const {
+  bool place(const Candidates& turned, Grid& covered, Grid& read, Placed& out) const {
     int best_top = std::numeric_limits<int>::max();
     glm::ivec2 best_at(0);
-    std::optional<Placed>* best = nullptr;
-    for (auto& candidate : turned) {
+    const Placed* best = nullptr;
+    for (const auto& candidate : turned) {
       if (!candidate) continue;
       const Footprint& f = candidate->footprint;
       const CellRun longest = f.covered.front();
@@ -344,13 +358,13 @@ class Packer {
         if (y + f.size.y < best_top || x < best_at.x) {
           best_top = y + f.size.y;
           best_at = {x, y};
-          best = &candidate;
+          best = &*candidate;
         }
         break;
       }
     }
     if (best == nullptr) return false;
-    out = *std::move(*best);
+    out = *best;
     for (const CellRun& r : out.footprint.covered) {
       for (int dy = -gutter_; dy <= gutter_; ++dy) {
         covered.occupy(best_at.y + r.row + dy, best_at.x + r.first - gutter_,

@@ -74,10 +74,11 @@ Checked require_valid(const Mesh& m, const PackOptions& options) {
   std::vector<double> density;
   for (std::size_t t = 0; t < charts.of_triangle.size(); ++t) {
     const auto chart = static_cast<int>(charts.of_triangle[t]);
-    // 2^-12 below a texel: where a weight vanishes nothing is read.
-    for (int i = 0; i <= 12; ++i) {
-      for (int j = 0; i + j <= 12; ++j) {
-        const float b1 = static_cast<float>(i) / 12, b2 = static_cast<float>(j) / 12;
+    // Points throughout the triangle, whose fetches read up to four texels; one whose weight is
+    // below a hundredth does not count, since UVs are snapped.
+    for (int i = 0; i <= 6; ++i) {
+      for (int j = 0; i + j <= 6; ++j) {
+        const float b1 = static_cast<float>(i) / 6, b2 = static_cast<float>(j) / 6;
         const glm::vec2 p = (1 - b1 - b2) * uv[3 * t] + b1 * uv[3 * t + 1] + b2 * uv[3 * t + 2];
         const float x = p.x * static_cast<float>(options.width) - 0.5f;
         const float y = p.y * static_cast<float>(options.height) - 0.5f;
@@ -126,12 +127,12 @@ TEST_CASE("a box becomes its six faces, undistorted") {
 }
 
 TEST_CASE("curved surfaces unwrap evenly into few charts") {
-  for (const int size : {64, 128, 600}) {
-    const Checked sphere = require_valid(shapes::sphere(40, 24), {size, size, 2});
+  for (const int size : {64, 600}) {
+    const Checked sphere = require_valid(shapes::sphere(32, 18), {size, size, 2});
     require_even(sphere);
     CHECK(sphere.unwrapped.charts <= 12);
     CHECK(sphere.coverage > 0.45);
-    const Checked torus = require_valid(shapes::torus(48, 20), {size, size, 2});
+    const Checked torus = require_valid(shapes::torus(32, 14), {size, size, 2});
     require_even(torus);
     CHECK(torus.unwrapped.charts <= 20);
     CHECK(torus.coverage > 0.45);
@@ -213,7 +214,7 @@ TEST_CASE("positions that are not finite do not spread") {
 }
 
 TEST_CASE("unwrapping twice gives the same bits") {
-  const Mesh m = shapes::torus(40, 16);
+  const Mesh m = shapes::torus(24, 12);
   const auto a = unwrap_mesh(m, {128, 128, 2});
   const auto b = unwrap_mesh(m, {128, 128, 2});
   REQUIRE(a);
