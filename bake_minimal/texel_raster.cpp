@@ -12,7 +12,6 @@
 namespace relit::bake {
 namespace {
 
-constexpr std::int64_t kHalf = FixedTriangle::kOne / 2;
 constexpr std::uint32_t kNobody = std::numeric_limits<std::uint32_t>::max();
 
 struct Nearest {
