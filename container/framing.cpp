@@ -8,7 +8,6 @@ extern "C" {
 #include <algorithm>
 
 #include "container/base/bytes.hpp"
-#include "container/base/limits.hpp"
 
 namespace relit::container {
 namespace {
@@ -91,11 +90,12 @@ Result<RecordHeader> decode_header(std::span<const std::uint8_t, kRecordHeaderBy
     return fail(ErrorCode::kCorrupt, "'" + type_name(header.type) +
                                          "' is no record type: four letters are, the third of them "
                                          "upper case");
-  if (header.payload_bytes > limits::kRecordBytes)
+  const std::uint64_t limit =
+      header.type == types::kSegment ? kMostSegmentPayloadBytes : limits::kRecordBytes;
+  if (header.payload_bytes > limit)
     return fail(ErrorCode::kLimit, "record '" + type_name(header.type) + "' announces " +
                                        std::to_string(header.payload_bytes) +
-                                       " bytes, the limit is " +
-                                       std::to_string(limits::kRecordBytes));
+                                       " bytes, the limit is " + std::to_string(limit));
   return header;
 }
 

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "container/base/limits.hpp"
 #include "container/base/result.hpp"
 
 /// The outermost layer of a .relit file: signature, record headers, checksums (FORMAT.md, section
@@ -24,6 +25,8 @@ inline constexpr std::array<std::uint8_t, 16> kSegmentMarker{
 inline constexpr std::size_t kRecordHeaderBytes = 24;
 inline constexpr std::size_t kRecordAlignment = 8;
 inline constexpr std::size_t kEndPayloadBytes = 16;
+/// A segment record of limits::kChunksPerSegment chunks.
+inline constexpr std::size_t kMostSegmentPayloadBytes = 40 + 16 * limits::kChunksPerSegment;
 
 /// Four ASCII letters, the first in the lowest byte. Any value can come out of a file; the
 /// enumerators are those that this version knows.
@@ -98,7 +101,8 @@ struct RecordHeader {
     const RecordHeader& header);
 
 /// Decodes a record header. Errors: kCorrupt for a wrong checksum (only with `verify_checksum`) or
-/// a type that is not four letters, kLimit for a payload beyond limits::kRecordBytes.
+/// a type that is not four letters, kLimit for a payload beyond limits::kRecordBytes or, of a
+/// segment, kMostSegmentPayloadBytes.
 [[nodiscard]] Result<RecordHeader> decode_header(
     std::span<const std::uint8_t, kRecordHeaderBytes> bytes, bool verify_checksum = true);
 

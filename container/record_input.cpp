@@ -14,6 +14,8 @@ constexpr std::size_t kFirstReadBytes = std::size_t{1} << 20;
 /// Below this, reading on is cheaper than seeking: over HTTP a seek is a new connection.
 constexpr std::uint64_t kLeastSeekBytes = std::uint64_t{1} << 16;
 constexpr std::size_t kScanBytes = std::size_t{1} << 16;
+/// How often, on the average, a byte may be gone over again.
+constexpr std::uint64_t kMostRewound = 8;
 constexpr std::size_t kCandidateBytes = kRecordHeaderBytes + kSegmentMarker.size();
 /// A payload buffer beyond this is given back after use.
 constexpr std::size_t kKeptBytes = std::size_t{1} << 24;
@@ -31,17 +33,18 @@ Result<std::size_t> RecordInput::read_source(std::span<std::uint8_t> out) {
   return got;
 }
 
+void RecordInput::consume_replay(std::size_t bytes) {
+  replay_at_ += bytes;
+  if (replay_at_ < replay_.size()) return;
+  replay_ = {};
+  replay_at_ = 0;
+}
+
 /// Reads until `out` is full or the source ends.
 Result<std::size_t> RecordInput::read_fully(std::span<std::uint8_t> out) {
   std::size_t done = std::min(out.size(), replay_.size() - replay_at_);
-  if (done > 0) {
-    std::memcpy(out.data(), replay_.data() + replay_at_, done);
-    replay_at_ += done;
-    if (replay_at_ == replay_.size()) {
-      replay_ = {};
-      replay_at_ = 0;
-    }
-  }
+  if (done > 0) std::memcpy(out.data(), replay_.data() + replay_at_, done);
+  consume_replay(done);
   while (done < out.size()) {
     RELIT_ASSIGN(const std::size_t got, read_source(out.subspan(done)));
     if (got == 0) break;
@@ -69,7 +72,7 @@ void RecordInput::drop_suspect() {
 Status RecordInput::perform_skip() {
   const std::size_t replayed =
       static_cast<std::size_t>(std::min<std::uint64_t>(pending_skip_, replay_.size() - replay_at_));
-  replay_at_ += replayed;
+  consume_replay(replayed);
   std::uint64_t left = std::exchange(pending_skip_, 0) - replayed;
   if (left >= kLeastSeekBytes && source_->seekable()) {
     // Beyond the end a seek would succeed, and hide that the data are incomplete.
@@ -176,40 +179,54 @@ Status RecordInput::seek(std::uint64_t offset_bytes) {
 
 /// Appends some of the source to replay_; false at the end.
 Result<bool> RecordInput::grow_window() {
-  const std::size_t before = replay_.size();
-  replay_.resize(before + kScanBytes);
-  auto got = read_source(std::span(replay_).subspan(before));
-  replay_.resize(before + (got ? *got : 0));
-  if (!got) return Unexpected{std::move(got).error()};
-  return *got > 0;
+  std::array<std::uint8_t, 16384> bytes;
+  RELIT_ASSIGN(const std::size_t got, read_source(bytes));
+  replay_.insert(replay_.end(), bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(got));
+  return got > 0;
+}
+
+/// Puts what was read of the damaged record back in front of what comes; false if there was
+/// nothing.
+bool RecordInput::rewind() {
+  if (header_) suspect_.assign(header_bytes_.begin(), header_bytes_.end());
+  header_.reset();
+  rewound_bytes_ += suspect_.size();
+  // Records inside records inside records could make this quadratic; honest damage never comes
+  // near.
+  if (rewound_bytes_ > kMostRewound * source_offset_ + kFirstReadBytes) drop_suspect();
+  if (suspect_.empty()) return false;
+  // replay_ is let go when it has been read to its end: until then the suspect bytes are its own.
+  if (!replay_.empty()) {
+    replay_at_ -= suspect_.size();
+    suspect_.clear();
+  } else {
+    replay_ = std::exchange(suspect_, {});
+  }
+  return true;
 }
 
 Result<bool> RecordInput::resync() {
   if (!header_ && !lost_ && pending_skip_ > 0) RELIT_TRY(perform_skip());
   pending_skip_ = 0;
-  if (header_) suspect_.assign(header_bytes_.begin(), header_bytes_.end());
-  const bool inclusive = header_.has_value() || suspect_.empty();
-  header_.reset();
-  suspect_.insert(suspect_.end(), replay_.begin() + static_cast<std::ptrdiff_t>(replay_at_),
-                  replay_.end());
-  replay_ = std::exchange(suspect_, {});
-  // Records start at multiples of 8 in the file; after a lossy source the window may start
-  // elsewhere.
-  const std::uint64_t window_offset = source_offset_ - replay_.size();
-  replay_at_ = (kRecordAlignment - window_offset % kRecordAlignment) % kRecordAlignment;
-  if (!inclusive && replay_at_ == 0) replay_at_ = kRecordAlignment;
+  const bool intact = header_.has_value();
+  const bool rewound = rewind();
+  std::size_t begin = replay_at_;
+  // Records start at multiples of 8 in the file; the scan may start elsewhere.
+  const std::uint64_t offset = source_offset_ - (replay_.size() - replay_at_);
+  replay_at_ += static_cast<std::size_t>(-offset % kRecordAlignment);
+  if (rewound && !intact && replay_at_ == begin) replay_at_ += kRecordAlignment;
 
   for (;; replay_at_ += kRecordAlignment) {
     while (replay_.size() < replay_at_ + kCandidateBytes) {
       if (replay_at_ > kScanBytes) {
-        dropped_bytes_ += replay_at_;
+        dropped_bytes_ += replay_at_ - std::exchange(begin, 0);
         replay_.erase(replay_.begin(), replay_.begin() + static_cast<std::ptrdiff_t>(replay_at_));
         replay_at_ = 0;
       }
       auto more = grow_window();
       if (!more) return lose(std::move(more).error());
       if (*more) continue;
-      dropped_bytes_ += replay_.size();
+      dropped_bytes_ += replay_.size() - begin;
       replay_ = {};
       replay_at_ = 0;
       lost_.reset();
@@ -223,7 +240,7 @@ Result<bool> RecordInput::resync() {
     if (header && header->type == types::kSegment && (header->flags & flags::kCriticalMask) == 0)
       break;
   }
-  dropped_bytes_ += replay_at_;
+  dropped_bytes_ += replay_at_ - begin;
   lost_.reset();
   return true;
 }

@@ -65,6 +65,8 @@ class RecordInput {
   Status perform_skip();
   void drop_suspect();
   Result<bool> grow_window();
+  bool rewind();
+  void consume_replay(std::size_t bytes);
   Unexpected lose(Error error);
 
   ByteSource* source_;
@@ -80,6 +82,7 @@ class RecordInput {
   std::vector<std::uint8_t> payload_;
   std::vector<std::uint8_t> suspect_;  ///< what was read of the damaged record, up to here
   std::optional<Error> lost_;
+  std::uint64_t rewound_bytes_ = 0;
   std::uint64_t dropped_bytes_ = 0;
 };
 

@@ -63,6 +63,8 @@ TEST_CASE("record headers with impossible contents are refused whatever their ch
   const auto beyond = decode_header(encode_header({types::kImage, 0, limits::kRecordBytes + 1, 0}));
   REQUIRE_FALSE(beyond);
   CHECK(beyond.error().code == ErrorCode::kLimit);
+  CHECK(decode_header(encode_header({types::kSegment, 0, kMostSegmentPayloadBytes, 0})));
+  CHECK_FALSE(decode_header(encode_header({types::kSegment, 0, kMostSegmentPayloadBytes + 1, 0})));
   const auto digits = decode_header(encode_header({record_type("AB12"), 0, 0, 0}));
   REQUIRE_FALSE(digits);
   CHECK(digits.error().code == ErrorCode::kCorrupt);
