@@ -193,7 +193,7 @@ Result<Source> find_source(const Document& document, int index, const AccessorUs
       use.where + ", " + label("accessor", static_cast<std::size_t>(index), source.accessor->name);
   source.components = component_count(source.accessor->type);
   source.component_bytes = component_bytes(source.accessor->componentType);
-  if (source.component_bytes == 0 ||
+  if (source.component_bytes == 0 || source.components == 0 ||
       (source.components != use.components && source.components != use.other_components)) {
     return document.fail(ErrorCode::kCorrupt, source.where,
                          "type or component type " +

@@ -159,6 +159,9 @@ TEST_CASE("accessors that leave their bufferView are named", "[gltf]") {
   check_error(with({{"bufferView", 50}}), corrupt, {"bufferView 50 does not exist"});
   check_error(with({{"type", "VEC2"}}), corrupt, {"POSITION", "3 components"});
   check_error(with({{"type", "SCALAR"}}), corrupt, {"POSITION", "3 components"});
+  // Types that nothing uses are no match for "no other number of components".
+  check_error(with({{"type", "MAT2"}}), corrupt, {"POSITION", "3 components"});
+  check_error(with({{"type", "MAT3"}}), corrupt, {"POSITION", "3 components"});
   check_error(with({{"componentType", 5125}}), corrupt, {"POSITION", "not normalized"});
   check_error(with({{"componentType", 5130}}), corrupt, {"POSITION"});
 }
