@@ -24,8 +24,8 @@ struct CodecTraits {
 };
 
 constexpr std::array<CodecTraits, 6> kCodecs = {{
-    {"h264", true, true, true, false, -12, 51, 18},
-    {"hevc", true, true, true, false, 0, 51, 18},
+    {"h264", true, true, true, false, -12, 51, 24},
+    {"hevc", true, true, true, false, 0, 51, 24},
     {"mpeg4", true, false, false, true, 0, 51, 13},
     {"ffv1", false, true, true, false, 0, 0, 0},
     {"vp9", true, true, true, false, 0, 63, 24},

@@ -27,7 +27,7 @@ struct VideoSettings {
   bool lossless = false;
   double crf = 18;  ///< as CodingOptions::crf
   std::string preset;
-  int reference_frames = 4;
+  int reference_frames = 3;
   int segment_frames = 25;  ///< pictures a segment: how often there is a key picture
 };
 

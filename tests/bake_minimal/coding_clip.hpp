@@ -10,6 +10,7 @@
 #include "bake_minimal/plane_encoder.hpp"
 #include "decoders/plane_decoder.hpp"
 #include "decoders/sh.hpp"
+#include "tests/test.hpp"
 
 /// Clips, and their way through encoder and decoder, for the tests of the coding.
 namespace relit::bake::test {
@@ -118,6 +119,29 @@ inline std::string describe(const CodingOptions& o) {
          (o.chroma ? std::to_string(static_cast<int>(*o.chroma)) : "?") + " block " +
          std::to_string(o.exponent_block) + " hold " + std::to_string(o.exponent_hold) +
          (o.layout == Layout::kGrid ? " grid" : " layered");
+}
+
+/// Segments of five frames and fast presets.
+inline CodingOptions quick(std::string codec, int bits, container::Chroma chroma, int block,
+                           int hold) {
+  CodingOptions o;
+  o.codec = std::move(codec);
+  o.bit_depth = bits;
+  o.chroma = chroma;
+  o.exponent_block = block;
+  o.exponent_hold = hold;
+  o.segment_frames = 5;
+  if (o.codec == "h264" || o.codec == "hevc") o.preset = "veryfast";
+  if (o.codec == "vp9" || o.codec == "av1") o.preset = "8";
+  return o;
+}
+
+inline Encoded must_encode(const Clip& clip, const CodingOptions& options) {
+  auto encoded = encode(clip, options);
+  INFO(describe(options));
+  INFO((encoded ? "" : encoded.error().message));
+  REQUIRE(encoded);
+  return std::move(*encoded);
 }
 
 }  // namespace relit::bake::test
