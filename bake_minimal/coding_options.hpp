@@ -51,8 +51,8 @@ struct CodingOptions {
   /// The encoder's own preset ("medium", "veryslow", …; cpu-used for vp9 and av1). Empty: veryslow
   /// for h264, slow for hevc.
   std::string preset;
-  /// Pictures that a decoder has to keep, at most (h264, hevc). More costs the player memory and gains
-  /// next to nothing: 2, 4 and 16 were within 0.5 % of each other.
+  /// Pictures that a decoder has to keep, at most (h264, hevc). More costs the player memory and
+  /// gains next to nothing: 2, 4 and 16 were within 0.5 % of each other.
   int reference_frames = 3;
 
   /// Without exponents: the same quantisation step for all bands, instead of steps in inverse

@@ -20,14 +20,14 @@ struct Walk {
   [[nodiscard]] double speed() const { return stride_m / stride_s; }
 };
 
-/// Lowest point of the sole below the ankle when the foot is pitched by `toe_down` radians, and how
-/// far the place of contact has rolled forward along the ground since the foot stood flat.
+/// Where the ankle is while the sole touches the ground.
 struct SoleContact {
   glm::dvec2 ankle{
       0.0};  ///< (z, y) of the ankle from the point on the ground under the ankle of the flat foot
 };
 
-/// Place of the ankle while the sole rolls on flat ground without slipping.
+/// Rolls the sole on flat ground without slipping, from flat (0) to `toe_down` radians; negative:
+/// onto the heel.
 [[nodiscard]] SoleContact roll_sole(double toe_down);
 
 /// Height of the sole's outline at `z` from the ankle, against the ground of the flat foot, for

@@ -69,18 +69,20 @@ glm::dvec3 low_sun(const glm::dvec3& d) {
   return mix(ground, sky, smooth_step(-0.07, 0.035, h));
 }
 
-// Teal on one side and orange running into magenta on the other, over a dim blue-grey room.
+// Teal on one side and orange running into magenta on the other, over a dim violet room. Between
+// them, where a camera in front of the figure looks, it stays dark.
 glm::dvec3 coloured_pair(const glm::dvec3& d) {
   const double h = d.y;
-  glm::dvec3 c = mix(glm::dvec3(0.125, 0.120, 0.150), glm::dvec3(0.070, 0.075, 0.110),
-                     smooth_step(-0.3, 0.9, h));
-  c = mix(c, glm::dvec3(0.150, 0.130, 0.140), smooth_step(0.05, -0.35, h));
-  c += glm::dvec3(0.18, 2.3, 2.6) * softbox(d, 78.0, 24.0, 0.58, 0.72);
-  c += glm::dvec3(0.06, 0.50, 0.58) * glow(d, towards(78.0, 18.0), 42.0);
-  c += glm::dvec3(4.1, 1.30, 0.24) * softbox(d, -82.0, 30.0, 0.50, 0.55);
-  c += glm::dvec3(1.6, 0.10, 0.75) * softbox(d, -128.0, 8.0, 0.55, 0.65);
-  c += glm::dvec3(0.70, 0.20, 0.16) * glow(d, towards(-95.0, 18.0), 44.0);
-  c += glm::dvec3(0.20, 0.19, 0.22) * glow(d, towards(0.0, 80.0), 35.0);
+  const glm::dvec3 floor(0.110, 0.095, 0.120), wall(0.150, 0.135, 0.190),
+      ceiling(0.060, 0.062, 0.105);
+  glm::dvec3 c = mix(wall, ceiling, smooth_step(0.0, 0.85, h));
+  c = mix(c, floor, smooth_step(0.02, -0.40, h));
+  c += glm::dvec3(0.16, 2.35, 2.70) * softbox(d, 112.0, 26.0, 0.50, 0.66);
+  c += glm::dvec3(0.03, 0.42, 0.50) * glow(d, towards(108.0, 16.0), 38.0);
+  c += glm::dvec3(4.3, 1.40, 0.26) * softbox(d, -52.0, 30.0, 0.46, 0.56);
+  c += glm::dvec3(1.15, 0.10, 0.62) * glow(d, towards(-92.0, 6.0), 24.0);
+  c += glm::dvec3(0.66, 0.20, 0.15) * glow(d, towards(-60.0, 16.0), 42.0);
+  c += glm::dvec3(0.16, 0.15, 0.20) * glow(d, towards(0.0, 80.0), 35.0);
   return c;
 }
 

@@ -9,8 +9,6 @@
 namespace relit::media {
 namespace {
 
-constexpr double kKnotAngle = 40.0 * kDegree;
-
 std::uint8_t sash_index(int joint) {
   const auto& list = sash_joints();
   return static_cast<std::uint8_t>(std::find(list.begin(), list.end(), joint) - list.begin());

@@ -1,12 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "media/skeleton.hpp"
 
-#include "media/exact_math.hpp"
-
 namespace relit::media {
 namespace {
-
-constexpr double kKnotAngle = 40.0 * kDegree;  // from the front, towards the left
 
 std::array<JointInfo, kJointCount> make_skeleton() {
   const Proportions& b = kBody;

@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "media/exact_math.hpp"
+
 namespace relit::media {
 
 /// Joints, parents first. The figure faces +z, its left is +x.
@@ -55,6 +57,9 @@ struct Proportions {
 };
 
 inline constexpr Proportions kBody;
+
+/// Where the sash is knotted, from the front towards the left.
+inline constexpr double kKnotAngle = 40.0 * kDegree;
 
 /// Where the tails leave the knot, in the pelvis' frame, and the direction they face.
 [[nodiscard]] glm::dvec3 tail_root(int first_joint);

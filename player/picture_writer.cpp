@@ -13,6 +13,7 @@
 extern "C" {
 #include <libavcodec/avcodec.h>
 #include <libavformat/avformat.h>
+#include <libavutil/mem.h>
 #include <libavutil/opt.h>
 #include <libswscale/swscale.h>
 }
@@ -289,7 +290,10 @@ class MovieWriter final : public PictureWriter {
     AVDictionary* settings = nullptr;
     av_dict_set(&settings, "movflags", "+faststart", 0);
     av_dict_set(&settings, "loop", "0", 0);
-    int code = avio_open(&muxer_->pb, ("file:" + part_.string()).c_str(), AVIO_FLAG_WRITE);
+    // The muxer itself opens the file again, to move the index to its front.
+    const std::string address = "file:" + part_.string();
+    muxer_->url = av_strdup(address.c_str());
+    int code = avio_open(&muxer_->pb, address.c_str(), AVIO_FLAG_WRITE);
     if (code >= 0) code = avformat_write_header(muxer_, &settings);
     av_dict_free(&settings);
     if (code < 0) return fail(ErrorCode::kIo, where + ": cannot be written: " + av_reason(code));
