@@ -26,7 +26,7 @@ struct CodecTraits {
 constexpr std::array<CodecTraits, 6> kCodecs = {{
     {"h264", true, true, true, false, -12, 51, 24},
     {"hevc", true, true, true, false, 0, 51, 24},
-    {"mpeg4", true, false, false, true, 0, 51, 13},
+    {"mpeg4", true, false, false, true, 0, 51, 22},
     {"ffv1", false, true, true, false, 0, 0, 0},
     {"vp9", true, true, true, false, 0, 63, 24},
     {"av1", true, false, true, false, 0, 63, 24},

@@ -24,7 +24,7 @@ struct CodingOptions {
   /// Quality, in the units of x264's constant rate factor: lower is better, +6 doubles the step and
   /// about halves the bytes. -12..51 with h264 (below 0 only with 10 bits), 0..51 with hevc and
   /// mpeg4, 0..63 with vp9 and av1. MPEG-4's quantiser is the one of the same step, qscale =
-  /// 2^((crf-10)/6), rounded to 1..31. Default: 24; 13 for mpeg4.
+  /// 2^((crf-10)/6), rounded to 1..31. Default: 24; 22 for mpeg4.
   std::optional<double> crf;
 
   /// Mantissas are coded without loss; what remains is the quantiser's error, quantiser_bound().

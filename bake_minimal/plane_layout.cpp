@@ -19,7 +19,7 @@ using container::Rect;
 /// Textures of the smallest machines end here.
 constexpr int kRowSamples = 2048;
 
-/// FFmpeg 5.1 does not give smaller FFV1 pictures back (2x1, 1x4) and returned wrong pictures with them;
+/// FFmpeg 5.1 does not give smaller FFV1 pictures back (2x1, 1x4);
 /// the decoder refuses them.
 constexpr int kLeastFfv1Side = 16;
 
