@@ -16,7 +16,7 @@
 #include "decoders/npy.hpp"
 #include "decoders/plane_decoder.hpp"
 #include "decoders/sh.hpp"
-#include "tests/test.hpp"
+#include "tests/places.hpp"
 
 using namespace relit;
 using namespace relit::bake;
@@ -35,7 +35,7 @@ struct Folder {
   Folder& operator=(const Folder&) = delete;
 };
 
-fs::path mannequin() { return fs::path(std::getenv("RELIT_BINARY_DIR")) / "media/mannequin.glb"; }
+fs::path mannequin() { return test::binary_dir() / "media/mannequin.glb"; }
 
 BakeOptions small_bake(const Folder& folder, const std::string& name) {
   BakeOptions options;
@@ -218,8 +218,7 @@ TEST_CASE("frames lie at k / fps below the duration") {
 
 TEST_CASE("the command's exit status is 1 for bad input and 2 for bad usage") {
   const Folder folder;
-  const std::string command =
-      (fs::path(std::getenv("RELIT_BINARY_DIR")) / "bin/relit-bake").string();
+  const std::string command = (test::binary_dir() / "bin/relit-bake").string();
   const auto status = [&](const std::string& arguments) {
     return WEXITSTATUS(std::system((command + " " + arguments + " >/dev/null 2>&1").c_str()));
   };

@@ -6,20 +6,12 @@
 #include <set>
 
 #include "bake_minimal/scene.hpp"
-#include "tests/test.hpp"
+#include "tests/places.hpp"
 
 namespace {
 
-namespace fs = std::filesystem;
 using relit::bake::Primitive;
 using relit::bake::Scene;
-
-/// Where the sample models lie: $RELIT_ASSETS, or shared/assets beside the source tree.
-fs::path assets_directory() {
-  if (const char* directory = std::getenv("RELIT_ASSETS")) return directory;
-  const char* source = std::getenv("RELIT_SOURCE_DIR");
-  return fs::path(source == nullptr ? "." : source) / ".." / "shared" / "assets";
-}
 
 std::size_t count_vertices(const Scene& scene) {
   std::size_t count = 0;
@@ -66,16 +58,14 @@ void check_against_manifest(const Scene& scene, const nlohmann::json& model) {
 }  // namespace
 
 TEST_CASE("every sample model loads with the numbers of its manifest", "[gltf][assets]") {
-  std::ifstream manifest_file(assets_directory() / "manifest.json");
-  if (!manifest_file) {
-    WARN("skipped: no sample models in " << assets_directory());
-    return;
-  }
+  const auto manifest_path = relit::test::shared_asset("manifest.json");
+  if (!manifest_path) return;
+  std::ifstream manifest_file(*manifest_path);
   const auto manifest = nlohmann::json::parse(manifest_file);
   for (const auto& model : manifest["models"]) {
     const std::string file = model["file"];
     INFO(file);
-    const auto scene = relit::bake::load_gltf(assets_directory() / file);
+    const auto scene = relit::bake::load_gltf(manifest_path->parent_path() / file);
     INFO((scene ? std::string() : scene.error().message));
     REQUIRE(scene.has_value());
     check_against_manifest(*scene, model);
@@ -93,12 +83,9 @@ TEST_CASE("every sample model loads with the numbers of its manifest", "[gltf][a
 }
 
 TEST_CASE("the walking figure stands on the ground, textured", "[gltf][assets]") {
-  const auto path = assets_directory() / "CesiumMan.glb";
-  if (!fs::exists(path)) {
-    WARN("skipped: no " << path);
-    return;
-  }
-  const auto scene = relit::bake::load_gltf(path);
+  const auto path = relit::test::shared_asset("CesiumMan.glb");
+  if (!path) return;
+  const auto scene = relit::bake::load_gltf(*path);
   REQUIRE(scene.has_value());
   REQUIRE(scene->images.size() == 1);
   CHECK(scene->images[0].media_type == "image/jpeg");

@@ -10,8 +10,8 @@
 
 #include "bake_minimal/bake.hpp"
 #include "decoders/sh.hpp"
+#include "tests/places.hpp"
 #include "tests/reference/path_tracer.hpp"
-#include "tests/test.hpp"
 
 using namespace relit;
 using namespace relit::bake;
@@ -181,18 +181,7 @@ void check(const std::filesystem::path& file, int bounces) {
   CHECK(std::abs(bias) < 0.005);
 }
 
-std::filesystem::path own_character() {
-  return std::filesystem::path(std::getenv("RELIT_BINARY_DIR")) / "media/mannequin.glb";
-}
-
-std::filesystem::path shared_asset(const char* name) {
-  const char* assets = std::getenv("RELIT_ASSETS");
-  const std::filesystem::path folder =
-      assets != nullptr
-          ? assets
-          : std::filesystem::path(std::getenv("RELIT_SOURCE_DIR")) / "../shared/assets";
-  return folder / name;
-}
+std::filesystem::path own_character() { return test::binary_dir() / "media/mannequin.glb"; }
 
 }  // namespace
 
@@ -201,10 +190,6 @@ TEST_CASE("direct light on the mannequin agrees with random paths") { check(own_
 TEST_CASE("one bounce on the mannequin agrees with random paths") { check(own_character(), 1); }
 
 TEST_CASE("one bounce on CesiumMan agrees with random paths") {
-  const auto file = shared_asset("CesiumMan.glb");
-  if (!std::filesystem::exists(file)) {
-    WARN("skipped: no " << file << "; set RELIT_ASSETS");
-    return;
-  }
-  check(file, 1);
+  const auto file = test::shared_asset("CesiumMan.glb");
+  if (file) check(*file, 1);
 }

@@ -10,11 +10,13 @@
 #include <string>
 #include <vector>
 
+#include "tests/places.hpp"
+
 /// Files that the player's tests share: the clip and lights that ship with relit, and a folder to
 /// write to.
 namespace relit::player::test {
 
-inline std::filesystem::path source_dir() { return std::getenv("RELIT_SOURCE_DIR"); }
+using relit::test::source_dir;
 inline std::filesystem::path shipped_clip() { return source_dir() / "media/mannequin.relit"; }
 inline std::filesystem::path shipped_light() {
   return source_dir() / "media/lights/studio_soft.hdr";
@@ -41,8 +43,7 @@ inline std::vector<std::uint8_t> read_bytes(const std::filesystem::path& path) {
 /// Runs `relit ARGUMENTS` and returns its exit status; what it says goes to `says`.
 inline int run_relit(const std::string& arguments, std::string* says = nullptr) {
   const Folder folder;
-  const std::string binary =
-      (std::filesystem::path(std::getenv("RELIT_BINARY_DIR")) / "bin/relit").string();
+  const std::string binary = (relit::test::binary_dir() / "bin/relit").string();
   const int status =
       std::system((binary + " " + arguments + " >" + folder.file("out") + " 2>&1").c_str());
   if (says != nullptr) {

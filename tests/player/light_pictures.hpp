@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "player/light.hpp"
-#include "tests/test.hpp"
+#include "tests/places.hpp"
 
 /// Files of lights, made or found, for the tests of load_light().
 namespace relit::player {
@@ -46,17 +46,6 @@ struct Folder {
 inline std::string read_bytes(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(file), {}};
-}
-
-/// The folder of the shared assets, or nothing.
-inline std::optional<fs::path> assets() {
-  if (const char* named = std::getenv("RELIT_ASSETS")) return fs::path(named);
-  if (const char* source = std::getenv("RELIT_SOURCE_DIR")) {
-    const fs::path beside = fs::path(source).parent_path() / "shared" / "assets";
-    if (fs::exists(beside)) return beside;
-  }
-  WARN("skipped: no assets; set RELIT_ASSETS to their folder");
-  return std::nullopt;
 }
 
 /// Pixels as RGBE holds them: (byte + ½) · 2^(e − 136), one of the three bytes ≥ 128.

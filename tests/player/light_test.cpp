@@ -200,14 +200,9 @@ TEST_CASE("the content decides over the suffix") {
 }
 
 TEST_CASE("the assets' lights are the standard lights") {
-  const auto folder = assets();
-  if (!folder) return;
-  const fs::path lights = folder->parent_path() / "tools" / "standard_lights.json";
-  if (!fs::exists(lights)) {
-    WARN("skipped: no " << lights.string());
-    return;
-  }
-  const auto standard = nlohmann::json::parse(read_bytes(lights.string()));
+  const auto found = relit::test::shared_asset("../tools/standard_lights.json");
+  if (!found) return;
+  const auto standard = nlohmann::json::parse(read_bytes(found->string()));
   int compared = 0;
   for (const auto& entry : standard["lights"]) {
     const auto name = entry["name"].get<std::string>();
@@ -218,7 +213,9 @@ TEST_CASE("the assets' lights are the standard lights") {
     LightOptions options;
     options.rotate_rad = std::stod(name.substr(space + 9)) * std::numbers::pi / 180;
     options.window = true;
-    const auto loaded = load_light((*folder / (stem + suffix)).string(), options);
+    const auto file = relit::test::shared_asset(stem + suffix);
+    REQUIRE(file);
+    const auto loaded = load_light(file->string(), options);
     INFO(message(loaded));
     REQUIRE(loaded);
     // They were made by sampling pixel centres and rounded to 6 digits; so is this. The exact
