@@ -47,10 +47,10 @@ class Bake {
   void summarize();
   Status trace();
   Status write();
-  Result<RangeScan> scan_range();
+  Result<RangeScan> scan_range(decoders::NpyWriter* reference);
   Status write_static(container::Writer& writer, const PlaneEncoder& encoder);
   Status write_segments(container::Writer& writer, PlaneEncoder& encoder);
-  Status write_reference();
+  Result<decoders::NpyWriter> create_reference() const;
   void fill_frame(std::uint64_t frame);
 
   [[nodiscard]] std::size_t texels() const {
@@ -207,7 +207,8 @@ Status Bake::write_segments(container::Writer& writer, PlaneEncoder& encoder) {
   return {};
 }
 
-Result<RangeScan> Bake::scan_range() {
+// Measures what the planes have to hold, and writes the reference, if there is one, on the way.
+Result<RangeScan> Bake::scan_range(decoders::NpyWriter* reference) {
   CodingOptions coding = options_.coding;
   coding.segment_frames = static_cast<int>(prepared_.segment_frames);
   coding.threads = thread_count(options_.transfer.threads);
@@ -218,6 +219,7 @@ Result<RangeScan> Bake::scan_range() {
   for (std::uint64_t k = 0; k < prepared_.frames; ++k) {
     fill_frame(k);
     RELIT_TRY(scan.add_frame(filled_));
+    if (reference != nullptr) RELIT_TRY(reference->write(std::span<const float>(filled_)));
     progress_.advance(k + 1);
   }
   progress_.finish();
@@ -226,7 +228,11 @@ Result<RangeScan> Bake::scan_range() {
 
 Status Bake::write() {
   const Stopwatch watch;
-  RELIT_ASSIGN(RangeScan scan, scan_range());
+  std::optional<decoders::NpyWriter> reference;
+  if (!options_.reference.empty()) {
+    RELIT_ASSIGN(reference, create_reference());
+  }
+  RELIT_ASSIGN(RangeScan scan, scan_range(reference ? &*reference : nullptr));
   ModelIds ids;
   ids.clip_id = prepared_.pose.track.clip_id;
   ids.first_track_id = prepared_.pose.track.track_id + 1;
@@ -246,25 +252,19 @@ Status Bake::write() {
   RELIT_TRY(write_segments(writer, encoder));
   RELIT_TRY(writer.finish());
   progress_.finish();
-  if (!options_.reference.empty()) RELIT_TRY(write_reference());
+  if (reference) RELIT_TRY(reference->commit());
   RELIT_TRY(sink->commit());
   summary_.bytes = writer.bytes_written();
   summary_.code_s = watch.seconds();
   return {};
 }
 
-Status Bake::write_reference() {
+Result<decoders::NpyWriter> Bake::create_reference() const {
   const std::uint64_t shape[] = {prepared_.frames, planes() / 3, 3,
                                  static_cast<std::uint64_t>(options_.transfer.height),
                                  static_cast<std::uint64_t>(options_.transfer.width)};
-  RELIT_ASSIGN(
-      decoders::NpyWriter writer,
-      decoders::NpyWriter::create(options_.reference, decoders::NpyWriter::Type::kFloat32, shape));
-  for (std::uint64_t k = 0; k < prepared_.frames; ++k) {
-    fill_frame(k);
-    RELIT_TRY(writer.write(std::span<const float>(filled_)));
-  }
-  return writer.commit();
+  return decoders::NpyWriter::create(options_.reference, decoders::NpyWriter::Type::kFloat32,
+                                     shape);
 }
 
 }  // namespace

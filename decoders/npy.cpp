@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "decoders/npy.hpp"
 
-#include <unistd.h>
-
 #include <bit>
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
 
 #include "container/base/limits.hpp"
@@ -18,8 +17,9 @@ static_assert(std::endian::native == std::endian::little,
 constexpr char kMagic[] = {'\x93', 'N', 'U', 'M', 'P', 'Y', 1, 0};
 constexpr std::uint64_t kMaxElements = 1ull << 34;
 
-Unexpected io_error(const std::filesystem::path& path, const char* action) {
-  return fail(ErrorCode::kIo, path.string() + ": cannot " + action + ": " + std::strerror(errno));
+std::span<const std::uint8_t> raw_bytes(const auto& values) {
+  const auto bytes = std::as_bytes(std::span(values));
+  return {reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()};
 }
 
 std::string header(const char* descr, std::span<const std::uint64_t> shape) {
@@ -46,66 +46,40 @@ Result<NpyWriter> NpyWriter::create(const std::filesystem::path& path, Type type
     writer.remaining_ *= side;
   }
   if (writer.remaining_ == 0) return fail(ErrorCode::kInvalid, path.string() + ": an empty array");
-  writer.target_ = path;
-  writer.temporary_ = path;
-  writer.temporary_ += "." + std::to_string(::getpid()) + ".part";
-  writer.file_.reset(std::fopen(writer.temporary_.c_str(), "wb"));
-  if (!writer.file_) return io_error(path, "be written");
+  writer.target_ = path.string();
+  RELIT_ASSIGN(writer.sink_, container::FileSink::create(writer.target_));
   const std::string text = header(type == Type::kFloat32 ? "<f4" : "|u1", shape);
   const std::uint8_t length[2] = {static_cast<std::uint8_t>(text.size() & 0xff),
                                   static_cast<std::uint8_t>(text.size() >> 8)};
-  std::FILE* file = writer.file_.get();
-  if (std::fwrite(kMagic, sizeof kMagic, 1, file) != 1 || std::fwrite(length, 2, 1, file) != 1 ||
-      std::fwrite(text.data(), text.size(), 1, file) != 1) {
-    return io_error(path, "be written");
-  }
+  RELIT_TRY(writer.sink_->write(raw_bytes(kMagic)));
+  RELIT_TRY(writer.sink_->write(length));
+  RELIT_TRY(writer.sink_->write(raw_bytes(text)));
   return writer;
 }
 
-NpyWriter::~NpyWriter() {
-  if (!file_) return;
-  file_.reset();
-  std::error_code ignored;
-  std::filesystem::remove(temporary_, ignored);
-}
-
-Status NpyWriter::write_bytes(const void* data, std::uint64_t elements, Type type,
-                              std::uint64_t size) {
-  if (type != type_ || elements > remaining_) {
-    return fail(ErrorCode::kInvalid, target_.string() + ": elements that its shape does not hold");
-  }
-  if (elements != 0 && std::fwrite(data, size, elements, file_.get()) != elements) {
-    return io_error(target_, "be written");
-  }
+Status NpyWriter::write_elements(std::span<const std::uint8_t> bytes, std::uint64_t elements,
+                                 Type type) {
+  if (type != type_ || elements > remaining_)
+    return fail(ErrorCode::kInvalid, target_ + ": elements that its shape does not hold");
+  RELIT_TRY(sink_->write(bytes));
   remaining_ -= elements;
   return {};
 }
 
 Status NpyWriter::write(std::span<const float> values) {
-  return write_bytes(values.data(), values.size(), Type::kFloat32, sizeof(float));
+  return write_elements(raw_bytes(values), values.size(), Type::kFloat32);
 }
 
 Status NpyWriter::write(std::span<const std::uint8_t> values) {
-  return write_bytes(values.data(), values.size(), Type::kUint8, 1);
+  return write_elements(values, values.size(), Type::kUint8);
 }
 
 Status NpyWriter::commit() {
   if (remaining_ != 0) {
     return fail(ErrorCode::kInvalid,
-                target_.string() + ": " + std::to_string(remaining_) + " elements are missing");
+                target_ + ": " + std::to_string(remaining_) + " elements are missing");
   }
-  if (std::fflush(file_.get()) != 0 || ::fsync(::fileno(file_.get())) != 0) {
-    return io_error(target_, "be written");
-  }
-  file_.reset();
-  std::error_code error;
-  std::filesystem::rename(temporary_, target_, error);
-  if (error) {
-    std::error_code ignored;
-    std::filesystem::remove(temporary_, ignored);
-    return fail(ErrorCode::kIo, target_.string() + ": cannot be written: " + error.message());
-  }
-  return {};
+  return sink_->commit();
 }
 
 namespace {
@@ -152,7 +126,10 @@ Result<NpyArray> read_npy(const std::filesystem::path& path) {
   const std::string where = path.string();
   std::unique_ptr<std::FILE, void (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"),
                                                         [](std::FILE* f) { std::fclose(f); });
-  if (!file) return io_error(path, "be read");
+  const auto io_error = [&] {
+    return fail(ErrorCode::kIo, where + ": cannot be read: " + std::strerror(errno));
+  };
+  if (!file) return io_error();
   std::uint8_t start[10];
   if (std::fread(start, sizeof start, 1, file.get()) != 1 || std::memcmp(start, kMagic, 6) != 0 ||
       start[6] != 1) {
@@ -185,11 +162,11 @@ Result<NpyArray> read_npy(const std::filesystem::path& path) {
   array.values.resize(elements);
   if (!bytes) {
     if (std::fread(array.values.data(), sizeof(float), elements, file.get()) != elements)
-      return io_error(path, "be read");
+      return io_error();
     return array;
   }
   std::vector<std::uint8_t> raw(elements);
-  if (std::fread(raw.data(), 1, elements, file.get()) != elements) return io_error(path, "be read");
+  if (std::fread(raw.data(), 1, elements, file.get()) != elements) return io_error();
   array.values.assign(raw.begin(), raw.end());
   return array;
 }

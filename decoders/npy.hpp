@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <span>
@@ -10,6 +9,7 @@
 #include <vector>
 
 #include "container/base/result.hpp"
+#include "container/byte_sink.hpp"
 
 namespace relit::decoders {
 
@@ -22,9 +22,6 @@ class NpyWriter {
   /// Errors: kIo (names the path and the system's reason), kInvalid for an empty shape.
   static Result<NpyWriter> create(const std::filesystem::path& path, Type type,
                                   std::span<const std::uint64_t> shape);
-  NpyWriter(NpyWriter&&) noexcept = default;
-  NpyWriter& operator=(NpyWriter&&) noexcept = default;
-  ~NpyWriter();
 
   /// The next elements, in order. Errors: kIo (disk full), kInvalid for more than the shape holds
   /// or another type.
@@ -34,14 +31,11 @@ class NpyWriter {
   Status commit();
 
  private:
-  struct Close {
-    void operator()(std::FILE* file) const { std::fclose(file); }
-  };
   NpyWriter() = default;
-  Status write_bytes(const void* data, std::uint64_t elements, Type type, std::uint64_t size);
+  Status write_elements(std::span<const std::uint8_t> bytes, std::uint64_t elements, Type type);
 
-  std::filesystem::path target_, temporary_;
-  std::unique_ptr<std::FILE, Close> file_;
+  std::string target_;
+  std::unique_ptr<container::FileSink> sink_;
   Type type_ = Type::kFloat32;
   std::uint64_t remaining_ = 0;
 };

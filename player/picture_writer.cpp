@@ -4,8 +4,6 @@
 #include <unistd.h>
 
 #include <array>
-#include <cerrno>
-#include <cstdio>
 #include <cstring>
 #include <string>
 #include <vector>
@@ -18,30 +16,13 @@ extern "C" {
 #include <libswscale/swscale.h>
 }
 
+#include "container/byte_sink.hpp"
+#include "decoders/ffmpeg.hpp"
+
 namespace relit::player {
 namespace {
 
-struct CodecClose {
-  void operator()(AVCodecContext* p) const { avcodec_free_context(&p); }
-};
-struct FrameClose {
-  void operator()(AVFrame* p) const { av_frame_free(&p); }
-};
-struct PacketClose {
-  void operator()(AVPacket* p) const { av_packet_free(&p); }
-};
-struct ScalerClose {
-  void operator()(SwsContext* p) const { sws_freeContext(p); }
-};
-struct FileClose {
-  void operator()(std::FILE* p) const { std::fclose(p); }
-};
-
-std::string av_reason(int code) {
-  char text[AV_ERROR_MAX_STRING_SIZE] = {};
-  av_strerror(code, text, sizeof text);
-  return text;
-}
+namespace ffmpeg = decoders::ffmpeg;
 
 // What an extension stands for.
 struct Format {
@@ -83,10 +64,10 @@ class Encoder {
   [[nodiscard]] AVPacket* packet() { return packet_.get(); }
 
  private:
-  std::unique_ptr<AVCodecContext, CodecClose> context_;
-  std::unique_ptr<AVFrame, FrameClose> frame_;
-  std::unique_ptr<AVPacket, PacketClose> packet_;
-  std::unique_ptr<SwsContext, ScalerClose> scaler_;
+  ffmpeg::Codec context_;
+  ffmpeg::Frame frame_;
+  ffmpeg::Packet packet_;
+  ffmpeg::Scaler scaler_;
 };
 
 Status Encoder::open(const Format& format, const PictureWriter::Options& options,
@@ -124,7 +105,7 @@ Status Encoder::open(const Format& format, const PictureWriter::Options& options
   if (const int code = avcodec_open2(&c, codec, nullptr); code < 0) {
     return fail(ErrorCode::kInvalid, where + ": " + format.encoder + " refuses " +
                                          std::to_string(c.width) + "x" + std::to_string(c.height) +
-                                         " pictures: " + av_reason(code));
+                                         " pictures: " + ffmpeg::reason(code));
   }
   frame_->format = c.pix_fmt;
   frame_->width = c.width;
@@ -144,7 +125,7 @@ Status Encoder::open(const Format& format, const PictureWriter::Options& options
 
 Result<AVFrame*> Encoder::convert(std::span<const std::uint8_t> rgba) {
   if (const int code = av_frame_make_writable(frame_.get()); code < 0) {
-    return fail(ErrorCode::kOutOfMemory, "picture: " + av_reason(code));
+    return fail(ErrorCode::kOutOfMemory, "picture: " + ffmpeg::reason(code));
   }
   AVCodecContext& c = *context_;
   if (c.pix_fmt == AV_PIX_FMT_PAL8) {
@@ -171,21 +152,6 @@ Status check_size(const PictureWriter::Options& options, std::span<const std::ui
       4 * static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height))
     return {};
   return fail(ErrorCode::kInvalid, options.path.string() + ": a picture of another size");
-}
-
-std::filesystem::path part_of(const std::filesystem::path& path) {
-  std::filesystem::path part = path;
-  part += "." + std::to_string(::getpid()) + ".part";
-  return part;
-}
-
-Status rename_into_place(const std::filesystem::path& from, const std::filesystem::path& to) {
-  std::error_code error;
-  std::filesystem::rename(from, to, error);
-  if (!error) return {};
-  std::error_code ignored;
-  std::filesystem::remove(from, ignored);
-  return fail(ErrorCode::kIo, to.string() + ": cannot be written: " + error.message());
 }
 
 // One file per picture.
@@ -217,7 +183,8 @@ class StillWriter final : public PictureWriter {
     if (code >= 0) code = avcodec_receive_packet(encoder.context(), encoder.packet());
     const std::filesystem::path path = numbered_path();
     if (code < 0)
-      return fail(ErrorCode::kEnvironment, path.string() + ": cannot encode: " + av_reason(code));
+      return fail(ErrorCode::kEnvironment,
+                  path.string() + ": cannot encode: " + ffmpeg::reason(code));
     ++written_;
     return write(path, {encoder.packet()->data, static_cast<std::size_t>(encoder.packet()->size)});
   }
@@ -236,19 +203,9 @@ class StillWriter final : public PictureWriter {
   }
 
   static Status write(const std::filesystem::path& path, std::span<const std::uint8_t> bytes) {
-    const std::filesystem::path part = part_of(path);
-    std::unique_ptr<std::FILE, FileClose> file(std::fopen(part.c_str(), "wb"));
-    const bool ok = file &&
-                    std::fwrite(bytes.data(), 1, bytes.size(), file.get()) == bytes.size() &&
-                    std::fflush(file.get()) == 0;
-    if (!ok) {
-      const std::string reason = std::strerror(errno);
-      std::error_code ignored;
-      if (file) std::filesystem::remove(part, ignored);
-      return fail(ErrorCode::kIo, path.string() + ": cannot be written: " + reason);
-    }
-    file.reset();
-    return rename_into_place(part, path);
+    RELIT_ASSIGN(const auto sink, container::FileSink::create(path.string()));
+    RELIT_TRY(sink->write(bytes));
+    return sink->commit();
   }
 
   Options options_;
@@ -257,12 +214,12 @@ class StillWriter final : public PictureWriter {
   std::uint64_t written_ = 0;
 };
 
-// All pictures in one file.
+// All pictures in one file. Not through FileSink: the MP4 muxer reads what it wrote, to move the
+// index to the front.
 class MovieWriter final : public PictureWriter {
  public:
   ~MovieWriter() override {
-    if (muxer_ == nullptr) return;
-    if (muxer_->pb != nullptr) avio_closep(&muxer_->pb);
+    if (muxer_ != nullptr && muxer_->pb != nullptr) avio_closep(&muxer_->pb);
     avformat_free_context(muxer_);
     std::error_code ignored;
     if (!part_.empty()) std::filesystem::remove(part_, ignored);
@@ -286,17 +243,18 @@ class MovieWriter final : public PictureWriter {
     }
     stream_->time_base = encoder_.context()->time_base;
     stream_->avg_frame_rate = encoder_.context()->framerate;
-    part_ = part_of(options.path);
+    part_ = options.path;
+    part_ += "." + std::to_string(::getpid()) + ".part";
     AVDictionary* settings = nullptr;
     av_dict_set(&settings, "movflags", "+faststart", 0);
     av_dict_set(&settings, "loop", "0", 0);
-    // The muxer itself opens the file again, to move the index to its front.
     const std::string address = "file:" + part_.string();
     muxer_->url = av_strdup(address.c_str());
     int code = avio_open(&muxer_->pb, address.c_str(), AVIO_FLAG_WRITE);
     if (code >= 0) code = avformat_write_header(muxer_, &settings);
     av_dict_free(&settings);
-    if (code < 0) return fail(ErrorCode::kIo, where + ": cannot be written: " + av_reason(code));
+    if (code < 0)
+      return fail(ErrorCode::kIo, where + ": cannot be written: " + ffmpeg::reason(code));
     return {};
   }
 
@@ -314,8 +272,12 @@ class MovieWriter final : public PictureWriter {
     if (code >= 0) code = closed;
     if (code < 0)
       return fail(ErrorCode::kIo,
-                  options_.path.string() + ": cannot be written: " + av_reason(code));
-    RELIT_TRY(rename_into_place(part_, options_.path));
+                  options_.path.string() + ": cannot be written: " + ffmpeg::reason(code));
+    std::error_code error;
+    std::filesystem::rename(part_, options_.path, error);
+    if (error)
+      return fail(ErrorCode::kIo,
+                  options_.path.string() + ": cannot be written: " + error.message());
     part_.clear();
     return {};
   }
@@ -325,18 +287,18 @@ class MovieWriter final : public PictureWriter {
     const std::string where = options_.path.string();
     int code = avcodec_send_frame(encoder_.context(), frame);
     if (code < 0)
-      return fail(ErrorCode::kEnvironment, where + ": cannot encode: " + av_reason(code));
+      return fail(ErrorCode::kEnvironment, where + ": cannot encode: " + ffmpeg::reason(code));
     AVPacket* packet = encoder_.packet();
     while ((code = avcodec_receive_packet(encoder_.context(), packet)) >= 0) {
       packet->duration = 1;
       av_packet_rescale_ts(packet, encoder_.context()->time_base, stream_->time_base);
       packet->stream_index = stream_->index;
       if (const int written = av_interleaved_write_frame(muxer_, packet); written < 0) {
-        return fail(ErrorCode::kIo, where + ": cannot be written: " + av_reason(written));
+        return fail(ErrorCode::kIo, where + ": cannot be written: " + ffmpeg::reason(written));
       }
     }
     if (code != AVERROR(EAGAIN) && code != AVERROR_EOF) {
-      return fail(ErrorCode::kEnvironment, where + ": cannot encode: " + av_reason(code));
+      return fail(ErrorCode::kEnvironment, where + ": cannot encode: " + ffmpeg::reason(code));
     }
     return {};
   }
