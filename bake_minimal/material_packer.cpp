@@ -9,30 +9,10 @@
 #include <utility>
 
 #include "bake_minimal/png_encoder.hpp"
+#include "bake_minimal/texture_math.hpp"
 
 namespace relit::bake {
 namespace {
-
-double srgb_to_linear(double v) {
-  return v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
-}
-double linear_to_srgb(double v) {
-  return v <= 0.0031308 ? v * 12.92 : 1.055 * std::pow(v, 1.0 / 2.4) - 0.055;
-}
-
-int wrapped(int i, int size, container::Wrap wrap) {
-  switch (wrap) {
-    case container::Wrap::kRepeat:
-      return ((i % size) + size) % size;
-    case container::Wrap::kMirror: {
-      const int j = ((i % (2 * size)) + 2 * size) % (2 * size);
-      return j < size ? j : 2 * size - 1 - j;
-    }
-    case container::Wrap::kClamp:
-      break;
-  }
-  return std::clamp(i, 0, size - 1);
-}
 
 /// The blue channel in [0,1] at texture coordinate (u, v), bilinear.
 double blue_at(const Image& image, const TextureUse& use, double u, double v) {

@@ -6,25 +6,16 @@ extern "C" {
 }
 
 #include <cstring>
-#include <memory>
 #include <string>
+
+#include "decoders/ffmpeg.hpp"
 
 namespace relit::bake {
 namespace {
 
-struct FreeContext {
-  void operator()(AVCodecContext* p) const { avcodec_free_context(&p); }
-};
-struct FreeFrame {
-  void operator()(AVFrame* p) const { av_frame_free(&p); }
-};
-struct FreePacket {
-  void operator()(AVPacket* p) const { av_packet_free(&p); }
-};
-
 Unexpected png_failure(const char* step, int code) {
   return fail(ErrorCode::kEnvironment,
-              std::string("PNG encoder: ") + step + " failed (" + std::to_string(code) + ")");
+              std::string("PNG encoder: ") + step + " failed: " + decoders::ffmpeg::reason(code));
 }
 
 bool opaque(std::span<const std::uint8_t> rgba) {
@@ -60,9 +51,9 @@ Result<std::vector<std::uint8_t>> encode_png(int width, int height,
   const AVCodec* codec = avcodec_find_encoder(AV_CODEC_ID_PNG);
   if (codec == nullptr) return fail(ErrorCode::kEnvironment, "libavcodec has no PNG encoder");
   const bool with_alpha = !opaque(rgba);
-  const std::unique_ptr<AVCodecContext, FreeContext> context(avcodec_alloc_context3(codec));
-  const std::unique_ptr<AVFrame, FreeFrame> frame(av_frame_alloc());
-  const std::unique_ptr<AVPacket, FreePacket> packet(av_packet_alloc());
+  const decoders::ffmpeg::Codec context(avcodec_alloc_context3(codec));
+  const decoders::ffmpeg::Frame frame(av_frame_alloc());
+  const decoders::ffmpeg::Packet packet(av_packet_alloc());
   if (!context || !frame || !packet) return fail(ErrorCode::kOutOfMemory, "PNG encoder: no memory");
   context->width = frame->width = width;
   context->height = frame->height = height;

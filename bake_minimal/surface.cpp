@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 
+#include "bake_minimal/texture_math.hpp"
 #include "bake_minimal/transfer.hpp"
 
 namespace relit::bake {
@@ -12,27 +13,11 @@ const std::array<float, 256>& srgb_table() {
   static const std::array<float, 256> table = [] {
     std::array<float, 256> t{};
     for (std::size_t i = 0; i < t.size(); ++i) {
-      const double v = static_cast<double>(i) / 255.0;
-      t[i] = static_cast<float>(v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4));
+      t[i] = static_cast<float>(srgb_to_linear(static_cast<double>(i) / 255.0));
     }
     return t;
   }();
   return table;
-}
-
-int wrapped(int i, int size, container::Wrap mode) {
-  switch (mode) {
-    case container::Wrap::kClamp:
-      return std::clamp(i, 0, size - 1);
-    case container::Wrap::kMirror: {
-      const int period = 2 * size;
-      const int m = ((i % period) + period) % period;
-      return m < size ? m : period - 1 - m;
-    }
-    case container::Wrap::kRepeat:
-      break;
-  }
-  return ((i % size) + size) % size;
 }
 
 // One fetch: linear RGB with straight alpha.

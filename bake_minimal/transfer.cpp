@@ -19,7 +19,7 @@ namespace {
 constexpr int kLanes = 8;
 constexpr int kMaxCoefficients = 16;
 constexpr std::size_t kBlock = 64;  // samples that a thread takes at a time
-constexpr float kOffset = 2e-5f;    // of the scene's diagonal, see ray_origin()
+constexpr float kOffset = 2e-5f;  // of the scene's diagonal: lifts rays off the surface they leave
 
 // Directions of one packet, and the basis functions there, lane by lane.
 struct DirectionGroup {
@@ -112,6 +112,7 @@ struct TransferTracer::Impl {
   std::vector<Vector3> increment, next_increment, total;
   std::vector<BlockHits> blocks;
   RTCScene scene = nullptr;
+  float offset = 0;  // of a ray's origin from its surface, metres
   std::uint64_t ray_count = 0;
 
   ~Impl() {
@@ -247,6 +248,10 @@ Status TransferTracer::Impl::prepare_frame(std::span<const glm::vec3> frame_posi
   if (!opaque.empty()) attach(opaque, false);
   if (!masked.empty()) attach(masked, true);
   rtcCommitScene(scene);
+  RTCBounds bounds;
+  rtcGetSceneBounds(scene, &bounds);
+  offset = kOffset * glm::length(glm::vec3(bounds.upper_x, bounds.upper_y, bounds.upper_z) -
+                                 glm::vec3(bounds.lower_x, bounds.lower_y, bounds.lower_z));
   return {};
 }
 
@@ -357,12 +362,6 @@ std::uint64_t TransferTracer::Impl::trace_block(std::size_t block,
   std::uint64_t rays = 0;
   BlockHits& out = blocks[block];
   out.hits.clear(), out.end.clear();
-  glm::vec3 low(std::numeric_limits<float>::infinity()), high(-low);
-  RTCBounds bounds;
-  rtcGetSceneBounds(scene, &bounds);
-  low = {bounds.lower_x, bounds.lower_y, bounds.lower_z},
-  high = {bounds.upper_x, bounds.upper_y, bounds.upper_z};
-  const float offset = kOffset * glm::length(high - low);
   const std::size_t last = std::min(samples.size(), (block + 1) * kBlock);
   for (std::size_t s = block * kBlock; s < last; ++s) {
     const TexelSample& sample = samples[s];

@@ -19,18 +19,9 @@ namespace {
 
 using container::Chroma;
 
-/// Hides this context's messages whatever the process's level is; errors are returned.
-constexpr int kQuiet = 128;
-
 /// Rate control weighs frames by their duration. A fixed rate makes quality independent of the
 /// clip's.
 constexpr int kNominalRate = 25;
-
-std::string describe(int error) {
-  std::array<char, AV_ERROR_MAX_STRING_SIZE> text{};
-  av_strerror(error, text.data(), text.size());
-  return text.data();
-}
 
 const char* encoder_name(const std::string& codec) {
   if (codec == "h264") return "libx264";
@@ -151,7 +142,7 @@ void configure(const VideoSettings& s, AVCodecContext& context, Options& options
   context.gop_size = s.segment_frames;
   context.thread_count = 1;
   context.flags |= AV_CODEC_FLAG_GLOBAL_HEADER | AV_CODEC_FLAG_CLOSED_GOP | AV_CODEC_FLAG_BITEXACT;
-  context.log_level_offset = kQuiet;
+  context.log_level_offset = decoders::ffmpeg::kQuiet;
   if (s.codec == "h264") configure_x264(s, context, options);
   if (s.codec == "hevc") configure_x265(s, options);
   if (s.codec == "mpeg4") configure_mpeg4(s, context, options);
@@ -181,12 +172,6 @@ std::vector<std::uint8_t> without_sei(std::span<const std::uint8_t> annex_b) {
 
 }  // namespace
 
-void VideoEncoder::Deleter::operator()(AVCodecContext* context) const {
-  avcodec_free_context(&context);
-}
-void VideoEncoder::Deleter::operator()(AVFrame* frame) const { av_frame_free(&frame); }
-void VideoEncoder::Deleter::operator()(AVPacket* packet) const { av_packet_free(&packet); }
-
 VideoEncoder::VideoEncoder(VideoEncoder&&) noexcept = default;
 VideoEncoder& VideoEncoder::operator=(VideoEncoder&&) noexcept = default;
 VideoEncoder::~VideoEncoder() = default;
@@ -210,10 +195,10 @@ Result<VideoEncoder> VideoEncoder::open(const VideoSettings& settings) {
   configure(settings, *encoder.context_, options);
   const int error = avcodec_open2(encoder.context_.get(), codec, options.get());
   if (error < 0) {
-    return fail(ErrorCode::kEnvironment, name + " does not take pictures of " +
-                                             std::to_string(settings.width) + "x" +
-                                             std::to_string(settings.height) + " with preset \"" +
-                                             settings.preset + "\": " + describe(error));
+    return fail(ErrorCode::kEnvironment,
+                name + " does not take pictures of " + std::to_string(settings.width) + "x" +
+                    std::to_string(settings.height) + " with preset \"" + settings.preset +
+                    "\": " + decoders::ffmpeg::reason(error));
   }
   if (const char* unknown = options.left_over()) {
     return fail(ErrorCode::kEnvironment, name + " has no option " + unknown);
@@ -273,7 +258,8 @@ Status VideoEncoder::encode(std::int64_t pts, bool first_of_segment,
   const int error = avcodec_send_frame(context_.get(), picture_.get());
   if (error < 0) {
     return fail(ErrorCode::kEnvironment, std::string(context_->codec->name) + " refuses frame " +
-                                             std::to_string(pts) + ": " + describe(error));
+                                             std::to_string(pts) + ": " +
+                                             decoders::ffmpeg::reason(error));
   }
   return receive(out);
 }
@@ -281,8 +267,8 @@ Status VideoEncoder::encode(std::int64_t pts, bool first_of_segment,
 Status VideoEncoder::finish(std::vector<CodedPacket>& out) {
   const int error = avcodec_send_frame(context_.get(), nullptr);
   if (error < 0) {
-    return fail(ErrorCode::kEnvironment,
-                std::string(context_->codec->name) + " does not finish: " + describe(error));
+    return fail(ErrorCode::kEnvironment, std::string(context_->codec->name) + " does not finish: " +
+                                             decoders::ffmpeg::reason(error));
   }
   return receive(out);
 }
@@ -292,8 +278,8 @@ Status VideoEncoder::receive(std::vector<CodedPacket>& out) {
     const int error = avcodec_receive_packet(context_.get(), packet_.get());
     if (error == AVERROR(EAGAIN) || error == AVERROR_EOF) return {};
     if (error < 0) {
-      return fail(ErrorCode::kEnvironment,
-                  std::string(context_->codec->name) + " fails: " + describe(error));
+      return fail(ErrorCode::kEnvironment, std::string(context_->codec->name) +
+                                               " fails: " + decoders::ffmpeg::reason(error));
     }
     CodedPacket packet;
     packet.pts = packet_->pts;

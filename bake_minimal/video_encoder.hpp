@@ -9,10 +9,7 @@
 
 #include "container/base/result.hpp"
 #include "container/records.hpp"
-
-struct AVCodecContext;
-struct AVFrame;
-struct AVPacket;
+#include "decoders/ffmpeg.hpp"
 
 /// libavcodec's encoders, fed exact samples: no scaler, no conversion, one thread, so that the same
 /// pictures always give the same bytes.
@@ -75,15 +72,10 @@ class VideoEncoder {
  private:
   VideoEncoder() = default;
   Status receive(std::vector<CodedPacket>& out);
-  struct Deleter {
-    void operator()(AVCodecContext* context) const;
-    void operator()(AVFrame* frame) const;
-    void operator()(AVPacket* packet) const;
-  };
   VideoSettings settings_;
-  std::unique_ptr<AVCodecContext, Deleter> context_;
-  std::unique_ptr<AVFrame, Deleter> picture_;
-  std::unique_ptr<AVPacket, Deleter> packet_;
+  decoders::ffmpeg::Codec context_;
+  decoders::ffmpeg::Frame picture_;
+  decoders::ffmpeg::Packet packet_;
 };
 
 }  // namespace relit::bake

@@ -145,8 +145,8 @@ enum class ChannelTarget : std::uint8_t {
   kMorphWeight = 3
 };
 
-/// One animated quantity. A node with any channel gets T, R and S from its channels, and from
-/// `translation`, `rotation`, `scale` of RestTrs where it has none for one of them.
+/// One animated quantity. A node that a channel or a RestTrs names gets each of T, R and S from its
+/// channel, else from its RestTrs, else the identity; any other node keeps the skeleton's matrix.
 struct PoseChannel {
   ChannelTarget target = ChannelTarget::kTranslation;
   std::uint32_t index = 0;  ///< node, or morph weight
@@ -156,7 +156,7 @@ struct PoseChannel {
   bool operator==(const PoseChannel&) const = default;
 };
 
-/// The unanimated parts of a node that has channels. Rotation is x, y, z, w, of unit length.
+/// The unanimated parts of a node of a pose track. Rotation is x, y, z, w, of unit length.
 struct RestTrs {
   std::uint32_t node = 0;
   std::array<float, 3> translation{};

@@ -15,6 +15,7 @@ extern "C" {
 #include <string>
 
 #include "container/base/limits.hpp"
+#include "decoders/ffmpeg.hpp"
 
 namespace relit::decoders {
 namespace {
@@ -35,23 +36,6 @@ constexpr std::array kSignatures{
     Signature{0, "DDS "sv, "image/vnd-ms.dds"},
     Signature{0, "BM"sv, "image/bmp"},
 };
-
-struct CodecContextDeleter {
-  void operator()(AVCodecContext* context) const { avcodec_free_context(&context); }
-};
-struct FrameDeleter {
-  void operator()(AVFrame* frame) const { av_frame_free(&frame); }
-};
-struct PacketDeleter {
-  void operator()(AVPacket* packet) const { av_packet_free(&packet); }
-};
-struct ScalerDeleter {
-  void operator()(SwsContext* scaler) const { sws_freeContext(scaler); }
-};
-using CodecContext = std::unique_ptr<AVCodecContext, CodecContextDeleter>;
-using Frame = std::unique_ptr<AVFrame, FrameDeleter>;
-using Packet = std::unique_ptr<AVPacket, PacketDeleter>;
-using Scaler = std::unique_ptr<SwsContext, ScalerDeleter>;
 
 struct Size {
   std::int64_t width = 0;
@@ -127,16 +111,17 @@ Status check_size(const Size& size) {
   return {};
 }
 
-Result<Frame> decode_frame(std::span<const std::uint8_t> bytes, std::string_view media_type) {
+Result<ffmpeg::Frame> decode_frame(std::span<const std::uint8_t> bytes,
+                                   std::string_view media_type) {
   const AVCodec* codec =
       avcodec_find_decoder(media_type == "image/png" ? AV_CODEC_ID_PNG : AV_CODEC_ID_MJPEG);
   if (codec == nullptr) {
     return fail(ErrorCode::kEnvironment, "this libavcodec has no decoder for " +
                                              std::string(media_type) + "; install one that has");
   }
-  CodecContext context(avcodec_alloc_context3(codec));
-  Frame frame(av_frame_alloc());
-  Packet packet(av_packet_alloc());
+  ffmpeg::Codec context(avcodec_alloc_context3(codec));
+  ffmpeg::Frame frame(av_frame_alloc());
+  ffmpeg::Packet packet(av_packet_alloc());
   if (!context || !frame || !packet ||
       av_new_packet(packet.get(), static_cast<int>(bytes.size())) < 0) {
     return fail(ErrorCode::kOutOfMemory, "no memory to decode a picture");
@@ -189,7 +174,7 @@ Result<DecodedImage> to_rgba(const AVFrame& frame) {
   image.height = frame.height;
   image.rgba.resize(static_cast<std::size_t>(frame.width) * static_cast<std::size_t>(frame.height) *
                     4);
-  Scaler scaler(sws_getContext(
+  ffmpeg::Scaler scaler(sws_getContext(
       frame.width, frame.height, format, frame.width, frame.height, AV_PIX_FMT_RGBA,
       SWS_BILINEAR | SWS_ACCURATE_RND | SWS_FULL_CHR_H_INP | SWS_FULL_CHR_H_INT | SWS_BITEXACT,
       nullptr, nullptr, nullptr));
@@ -238,7 +223,7 @@ Result<DecodedImage> decode_image(std::span<const std::uint8_t> bytes,
   }
   RELIT_ASSIGN(const Size size, type == "image/png" ? check_png(bytes) : check_jpeg(bytes));
   RELIT_TRY(check_size(size));
-  RELIT_ASSIGN(const Frame frame, decode_frame(bytes, type));
+  RELIT_ASSIGN(const ffmpeg::Frame frame, decode_frame(bytes, type));
   RELIT_TRY(check_size({frame->width, frame->height}));
   const AVPixFmtDescriptor* format = av_pix_fmt_desc_get(static_cast<AVPixelFormat>(frame->format));
   if (format == nullptr || (type == "image/jpeg" && (format->nb_components > 3 ||

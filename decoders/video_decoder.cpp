@@ -20,16 +20,6 @@ namespace {
 
 constexpr std::array<std::string_view, 6> kCodecs = {"h264", "hevc", "mpeg4", "ffv1", "vp9", "av1"};
 
-/// av_log() adds this to the level of each message, which silences a context without touching the
-/// process-wide level: damaged streams are reported by Result, not on standard error.
-constexpr int kQuiet = 128;
-
-std::string describe(int error) {
-  std::array<char, AV_ERROR_MAX_STRING_SIZE> text{};
-  av_strerror(error, text.data(), text.size());
-  return text.data();
-}
-
 std::string track_name(const VideoFormat& format) {
   return "track " + std::to_string(format.track_id) + " (" + format.codec + ")";
 }
@@ -169,11 +159,6 @@ SampleView VideoFrame::component(int index) const {
   return view;
 }
 
-void VideoDecoder::Deleter::operator()(AVCodecContext* context) const {
-  avcodec_free_context(&context);
-}
-void VideoDecoder::Deleter::operator()(AVPacket* packet) const { av_packet_free(&packet); }
-
 VideoDecoder::VideoDecoder(VideoDecoder&&) noexcept = default;
 VideoDecoder& VideoDecoder::operator=(VideoDecoder&&) noexcept = default;
 VideoDecoder::~VideoDecoder() = default;
@@ -214,14 +199,15 @@ Result<VideoDecoder> VideoDecoder::open(const VideoFormat& format, int threads) 
   context.error_concealment = 0;
   context.err_recognition = AV_EF_CRCCHECK | AV_EF_BITSTREAM | AV_EF_BUFFER | AV_EF_EXPLODE;
   context.workaround_bugs = 0;
-  context.log_level_offset = kQuiet;
+  context.log_level_offset = ffmpeg::kQuiet;
   context.opaque = reinterpret_cast<void*>((std::intptr_t{format.bit_depth} << 8) |
                                            static_cast<std::intptr_t>(format.chroma));
   context.get_format = choose_format;
   const int error = avcodec_open2(&context, codec, nullptr);
   if (error < 0) {
-    return fail(ErrorCode::kCorrupt, track_name(format) + ": the decoder does not open: " +
-                                         describe(error) + "; its codec_private may be damaged");
+    return fail(ErrorCode::kCorrupt, track_name(format) +
+                                         ": the decoder does not open: " + ffmpeg::reason(error) +
+                                         "; its codec_private may be damaged");
   }
   decoder.format_ = format;
   decoder.threads_ = threads;
@@ -259,7 +245,7 @@ Status VideoDecoder::send(std::span<const std::uint8_t> packet, std::int64_t pts
   packet_->size = 0;
   if (error < 0) {
     return fail(error == AVERROR(ENOMEM) ? ErrorCode::kOutOfMemory : ErrorCode::kCorrupt,
-                where() + ": the packet does not decode: " + describe(error));
+                where() + ": the packet does not decode: " + ffmpeg::reason(error));
   }
   return {};
 }
@@ -267,7 +253,8 @@ Status VideoDecoder::send(std::span<const std::uint8_t> packet, std::int64_t pts
 Status VideoDecoder::drain() {
   const int error = avcodec_send_packet(context_.get(), nullptr);
   if (error < 0 && error != AVERROR_EOF) {
-    return fail(ErrorCode::kCorrupt, track_name(format_) + ": draining failed: " + describe(error));
+    return fail(ErrorCode::kCorrupt,
+                track_name(format_) + ": draining failed: " + ffmpeg::reason(error));
   }
   return {};
 }
@@ -283,7 +270,7 @@ Result<VideoDecoder::Received> VideoDecoder::receive(VideoFrame& out) {
   if (error == AVERROR_EOF) return Received::kEnd;
   if (error < 0) {
     return fail(error == AVERROR(ENOMEM) ? ErrorCode::kOutOfMemory : ErrorCode::kCorrupt,
-                track_name(format_) + ": a picture does not decode: " + describe(error));
+                track_name(format_) + ": a picture does not decode: " + ffmpeg::reason(error));
   }
   if (auto checked = check(*out.frame_); !checked) {
     out.clear();

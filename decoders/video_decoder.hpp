@@ -10,10 +10,7 @@
 #include "container/base/plane_view.hpp"
 #include "container/base/result.hpp"
 #include "container/records.hpp"
-
-struct AVCodecContext;
-struct AVFrame;
-struct AVPacket;
+#include "decoders/ffmpeg.hpp"
 
 /// libavcodec, restricted to what planes need: pictures as they were coded, never scaled, never
 /// converted, never concealed.
@@ -88,12 +85,8 @@ class VideoDecoder {
  private:
   VideoDecoder() = default;
   [[nodiscard]] Status check(const AVFrame& frame) const;
-  struct Deleter {
-    void operator()(AVCodecContext* context) const;
-    void operator()(AVPacket* packet) const;
-  };
-  std::unique_ptr<AVCodecContext, Deleter> context_;
-  std::unique_ptr<AVPacket, Deleter> packet_;
+  ffmpeg::Codec context_;
+  ffmpeg::Packet packet_;
   VideoFormat format_;
   int threads_ = 1;
 };

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <numbers>
 
+#include "decoders/sh_constants.hpp"
 #include "player/source.hpp"
 
 namespace relit::player {
@@ -53,7 +54,7 @@ Result<LoadedLight> load_light(const LightArguments& arguments, int order) {
     std::fprintf(stderr, "relit: warning: %s\n", warning.c_str());
   const double least =
       *std::min_element(light.minimum_radiance.begin(), light.minimum_radiance.end());
-  const double mean = light.light.sh.front()[1] * 0.28209479177387814;
+  const double mean = light.light.sh.front()[1] * decoders::kBand0;
   if (least < -1e-6 * std::max(mean, 1e-30) && !arguments.window) {
     std::fprintf(stderr,
                  "relit: warning: %s: rings down to a radiance of %.3g (mean %.3g): an order-%d "

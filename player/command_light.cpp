@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <cstdio>
 
+#include "decoders/sh_constants.hpp"
 #include "player/command.hpp"
 
 namespace relit::player {
@@ -19,8 +20,8 @@ int run(const Arguments& arguments) {
     return report(status.error());
   const auto& mean = light->light.sh.front();
   std::fprintf(stderr, "%s: order %d, mean radiance %.4g %.4g %.4g\n", arguments.output.c_str(),
-               light->light.order(), mean[0] * 0.28209479177387814, mean[1] * 0.28209479177387814,
-               mean[2] * 0.28209479177387814);
+               light->light.order(), mean[0] * decoders::kBand0, mean[1] * decoders::kBand0,
+               mean[2] * decoders::kBand0);
   return kSuccess;
 }
 

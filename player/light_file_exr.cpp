@@ -14,10 +14,13 @@ extern "C" {
 }
 
 #include "container/base/limits.hpp"
+#include "decoders/ffmpeg.hpp"
 #include "player/light_file.hpp"
 
 namespace relit::player {
 namespace {
+
+namespace ffmpeg = decoders::ffmpeg;
 
 constexpr std::uint32_t kMagic = 20000630;
 constexpr std::uint32_t kDeepFlag = 0x800;
@@ -140,17 +143,6 @@ Status check_header(const Header& header, std::vector<std::string>& warnings) {
   return {};
 }
 
-struct FreeContext {
-  void operator()(AVCodecContext* context) const { avcodec_free_context(&context); }
-};
-struct FreeFrame {
-  void operator()(AVFrame* frame) const { av_frame_free(&frame); }
-};
-struct FreePacket {
-  void operator()(AVPacket* packet) const { av_packet_free(&packet); }
-};
-using Frame = std::unique_ptr<AVFrame, FreeFrame>;
-
 /// What no decoded sample may be: a NaN that the decoder leaves where a block failed, since it
 /// reports no failure of single blocks.
 constexpr std::uint32_t kUndecoded = 0xFFFFFFFF;
@@ -164,14 +156,14 @@ int allocate_undecoded(AVCodecContext* context, AVFrame* frame, int flags) {
   return status;
 }
 
-Result<Frame> decode(std::span<const std::uint8_t> bytes) {
+Result<ffmpeg::Frame> decode(std::span<const std::uint8_t> bytes) {
   const AVCodec* codec = avcodec_find_decoder(AV_CODEC_ID_EXR);
   if (codec == nullptr) {
     return fail(ErrorCode::kEnvironment, "this libavcodec has no OpenEXR decoder");
   }
-  const std::unique_ptr<AVCodecContext, FreeContext> context(avcodec_alloc_context3(codec));
-  const std::unique_ptr<AVPacket, FreePacket> packet(av_packet_alloc());
-  Frame frame(av_frame_alloc());
+  const ffmpeg::Codec context(avcodec_alloc_context3(codec));
+  const ffmpeg::Packet packet(av_packet_alloc());
+  ffmpeg::Frame frame(av_frame_alloc());
   if (!context || !packet || !frame ||
       av_new_packet(packet.get(), static_cast<int>(bytes.size())) < 0) {
     return fail(ErrorCode::kOutOfMemory, "not enough memory for the OpenEXR file");
@@ -225,7 +217,7 @@ Result<decoders::Environment> read_exr(std::span<const std::uint8_t> bytes,
                                        std::vector<std::string>& warnings) {
   RELIT_ASSIGN(const Header header, read_header(bytes));
   RELIT_TRY(check_header(header, warnings));
-  RELIT_ASSIGN(const Frame frame, decode(bytes));
+  RELIT_ASSIGN(const ffmpeg::Frame frame, decode(bytes));
   RELIT_ASSIGN(const auto planes, channel_planes(*frame));
   if (frame->width != header.display.width() || frame->height != header.display.height()) {
     return fail(ErrorCode::kCorrupt, "the OpenEXR picture has not the size that its header says");

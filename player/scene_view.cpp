@@ -5,10 +5,10 @@
 #include <cmath>
 #include <glm/gtc/constants.hpp>
 
+#include "decoders/sh_constants.hpp"
+
 namespace relit::player {
 namespace {
-
-constexpr double kMeanOfY0 = 0.28209479177387814;
 
 double luminance(const std::array<double, 3>& rgb) {
   return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
@@ -17,7 +17,7 @@ double luminance(const std::array<double, 3>& rgb) {
 // The exposure under which a white surface in the mean of the light comes out a little below white.
 Result<float> choose_exposure(const std::string& text, const decoders::Light& light) {
   if (text == "auto") {
-    const double mean = luminance(light.sh.front()) * kMeanOfY0;
+    const double mean = luminance(light.sh.front()) * decoders::kBand0;
     return mean > 0 ? static_cast<float>(0.8 / mean) : 1.0f;
   }
   double stops = 0;

@@ -8,14 +8,10 @@ extern "C" {
 #include <libavutil/dict.h>
 }
 
+#include "decoders/ffmpeg.hpp"
+
 namespace relit::player {
 namespace {
-
-std::string av_reason(int code) {
-  char text[AV_ERROR_MAX_STRING_SIZE] = {};
-  av_strerror(code, text, sizeof text);
-  return text;
-}
 
 class HttpSource final : public container::ByteSource {
  public:
@@ -33,7 +29,9 @@ class HttpSource final : public container::ByteSource {
     if (code == AVERROR_PROTOCOL_NOT_FOUND) {
       return fail(ErrorCode::kEnvironment, address + ": this FFmpeg does not speak the protocol");
     }
-    if (code < 0) return fail(ErrorCode::kIo, address + ": cannot be opened: " + av_reason(code));
+    if (code < 0)
+      return fail(ErrorCode::kIo,
+                  address + ": cannot be opened: " + decoders::ffmpeg::reason(code));
     return std::unique_ptr<container::ByteSource>(new HttpSource(address, context));
   }
 
@@ -44,7 +42,8 @@ class HttpSource final : public container::ByteSource {
     const int got = avio_read_partial(context_, out.data(), wanted);
     if (got == AVERROR_EOF || got == 0) return std::size_t{0};
     if (got < 0)
-      return fail(ErrorCode::kIo, address_ + ": the connection was lost: " + av_reason(got));
+      return fail(ErrorCode::kIo,
+                  address_ + ": the connection was lost: " + decoders::ffmpeg::reason(got));
     return static_cast<std::size_t>(got);
   }
 
@@ -66,7 +65,7 @@ class HttpSource final : public container::ByteSource {
         avio_seek(context_, static_cast<std::int64_t>(offset_bytes), SEEK_SET);
     if (code < 0) {
       return fail(ErrorCode::kIo, address_ + ": cannot go to byte " + std::to_string(offset_bytes) +
-                                      ": " + av_reason(static_cast<int>(code)));
+                                      ": " + decoders::ffmpeg::reason(static_cast<int>(code)));
     }
     return {};
   }

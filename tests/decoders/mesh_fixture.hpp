@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "container/records.hpp"
+#include "decoders/mesh.hpp"
 
 /// Small encoders for records, written from FORMAT.md and not shared with the baker.
 namespace relit::test {
@@ -87,6 +88,10 @@ inline container::MeshRecord quad(std::size_t influence_streams = 1) {
   const std::vector<std::uint32_t> indices{0, 1, 2, 0, 2, 3};
   record.indices = index_bytes(indices, 4);
   return record;
+}
+
+inline decoders::Mesh decoded_quad(std::size_t influence_streams = 1) {
+  return decoders::decode_mesh(quad(influence_streams), 2, 4).value();
 }
 
 }  // namespace relit::test

@@ -103,14 +103,6 @@ float slide(const PoseTrack& track, double frame) {
   return pose.palette.at(0)[3].x;
 }
 
-Mesh decoded_quad(std::size_t influence_streams = 1) {
-  Result<Mesh> mesh = decoders::decode_mesh(test::quad(influence_streams), 2, 4);
-  REQUIRE(mesh);
-  return std::move(*mesh);
-}
-
-glm::mat4x3 affine(const glm::mat4& m) { return glm::mat4x3(m); }
-
 }  // namespace
 
 TEST_CASE("pose track interpolates between frames and holds at the ends") {
@@ -315,7 +307,7 @@ TEST_CASE("a track without channels stands still once its packets arrive") {
 }
 
 TEST_CASE("vertex tracks give every vertex of every mesh in every mode") {
-  std::vector<Mesh> meshes{decoded_quad(), decoded_quad()};
+  std::vector<Mesh> meshes{test::decoded_quad(), test::decoded_quad()};
   meshes[1].id = 8;
   PoseTrackRecord track;
   track.kind = PoseKind::kVertices;
@@ -359,7 +351,7 @@ TEST_CASE("sampling reuses the memory of the pose") {
 TEST_CASE("a pose can pass from one kind of track to the other") {
   PoseTrack joints = Slider().create();
   REQUIRE(joints.add_packet(packet(ramp(8, 3), PoseKind::kJoints, 1), 0, 3));
-  const std::vector<Mesh> meshes{decoded_quad()};
+  const std::vector<Mesh> meshes{test::decoded_quad()};
   PoseTrackRecord record;
   record.kind = PoseKind::kVertices;
   record.vertex_ranges.push_back({7, {}, {1, 1, 1}});
@@ -436,7 +428,7 @@ TEST_CASE("pose track refuses records that contradict the skeleton or the meshes
     s.track.rest[0].node = 1;
     CHECK(refused(s.skeleton, s.track));
   }
-  const std::vector<Mesh> meshes{decoded_quad()};
+  const std::vector<Mesh> meshes{test::decoded_quad()};
   PoseTrackRecord vertices;
   vertices.kind = PoseKind::kVertices;
   CHECK(refused({}, vertices, meshes));
@@ -514,94 +506,4 @@ TEST_CASE("pose packets: truncations fail, flipped bits never do harm") {
     CHECK((x >= 0 && x <= 65535 / 4.0f));
   }
   CHECK(accepted > 0);
-}
-
-TEST_CASE("pose_mesh blends eight influences") {
-  const Mesh mesh = decoded_quad(2);
-  Pose pose;
-  pose.palette = {affine(glm::translate(glm::mat4(1), glm::vec3(1, 0, 0))),
-                  affine(glm::translate(glm::mat4(1), glm::vec3(0, 2, 0)))};
-  std::vector<glm::vec3> posed(4);
-  decoders::pose_mesh(mesh, 0, pose, posed, {});
-  for (std::size_t v = 0; v < 4; ++v) {
-    const glm::dvec3 expected =
-        glm::dvec3(mesh.positions[v]) + glm::dvec3(55 / 255.0, 2 * 200 / 255.0, 0);
-    // Coordinates up to 17 in floats: a few steps of 1e-6.
-    CHECK(glm::length(glm::dvec3(posed[v]) - expected) < 1e-5);
-  }
-}
-
-TEST_CASE("pose_mesh turns normals by the inverse transpose, mirrors included") {
-  std::mt19937 random(5);
-  std::uniform_real_distribution<double> uniform(-1, 1);
-  Mesh mesh = decoded_quad();
-  for (int round = 0; round < 200; ++round) {
-    glm::dmat4 m(1);
-    for (int c = 0; c < 4; ++c) {
-      for (int r = 0; r < 3; ++r) m[c][r] = uniform(random);
-    }
-    const glm::dmat3 linear(m);
-    const double determinant = glm::determinant(linear);
-    if (std::abs(determinant) < 0.05) continue;
-    mesh.normals.clear();
-    for (std::size_t v = 0; v < 4; ++v) {
-      const glm::dvec3 n(uniform(random), uniform(random), uniform(random));
-      mesh.normals.push_back(glm::vec3(glm::normalize(n)));
-    }
-    Pose pose;
-    pose.palette = {affine(glm::mat4(m))};
-    std::vector<glm::vec3> positions(4), normals(4);
-    decoders::pose_mesh(mesh, 0, pose, positions, normals);
-    for (std::size_t v = 0; v < 4; ++v) {
-      const glm::dvec3 p(m * glm::dvec4(glm::dvec3(mesh.positions[v]), 1));
-      CHECK(glm::length(glm::dvec3(positions[v]) - p) < 2e-5);  // |p| < 40: 2.4e-6 a step
-      const glm::dvec3 n =
-          glm::normalize(glm::transpose(glm::inverse(linear)) * glm::dvec3(mesh.normals[v]));
-      // Cofactors of up to 2 are off by some 3e-7; the shortest image, of det/|m| >= 0.05/3, makes
-      // that 2e-5.
-      CHECK(glm::length(glm::dvec3(normals[v]) - n) < 2e-5);
-    }
-  }
-}
-
-TEST_CASE("pose_mesh keeps a normal where a joint is scaled to nothing") {
-  Mesh mesh = decoded_quad();
-  mesh.normals.assign(4, glm::vec3(0, 1, 0));
-  Pose pose;
-  pose.palette = {glm::mat4x3(0.0f)};
-  std::vector<glm::vec3> positions(4), normals(4);
-  decoders::pose_mesh(mesh, 0, pose, positions, normals);
-  CHECK(positions[2] == glm::vec3(0));
-  CHECK(normals[2] == glm::vec3(0, 1, 0));
-}
-
-TEST_CASE("pose_mesh adds morph targets before it skins") {
-  Mesh mesh = decoded_quad();
-  mesh.first_morph_weight = 1;
-  mesh.morph_targets = {std::vector<glm::vec3>(4, glm::vec3(1, 0, 0)),
-                        std::vector<glm::vec3>(4, glm::vec3(0, 1, 0))};
-  mesh.normals.assign(4, glm::vec3(0, 0, 1));
-  mesh.morph_normals = {std::vector<glm::vec3>(4, glm::vec3(0, 1, -1)),
-                        std::vector<glm::vec3>(4, glm::vec3(0, 0, 0))};
-  Pose pose;
-  pose.morph_weights = {9, 1, 0.5f};
-  pose.palette = {affine(glm::scale(glm::mat4(1), glm::vec3(2)))};
-  std::vector<glm::vec3> positions(4), normals(4);
-  decoders::pose_mesh(mesh, 0, pose, positions, normals);
-  CHECK(positions[1] == 2.0f * (mesh.positions[1] + glm::vec3(1, 0.5f, 0)));
-  CHECK(glm::length(normals[1] - glm::vec3(0, 1, 0)) < 1e-6f);
-}
-
-TEST_CASE("pose_mesh takes normals from the triangles where there are no others") {
-  const Mesh mesh = decoded_quad(0);
-  Pose pose;
-  std::vector<glm::vec3> positions(4), normals(4);
-  decoders::pose_mesh(mesh, 0, pose, positions, normals);
-  CHECK(positions == mesh.positions);
-  // Vertex 1 belongs to triangle 0, 1, 2 alone, which lies in the plane of x and y.
-  CHECK(normals[1] == glm::vec3(0, 0, 1));
-  for (const glm::vec3& n : normals) CHECK(std::abs(glm::length(n) - 1) < 1e-6f);
-  pose.vertices = {{{0, 0, 0}, {0, 0, 1}, {1, 0, 1}, {1, 0, 0}}};
-  decoders::pose_mesh(mesh, 0, pose, positions, normals);
-  CHECK(normals[3] == glm::vec3(0, 1, 0));
 }
