@@ -166,8 +166,8 @@ Status Bake::write_static(container::Writer& writer, const PlaneEncoder& encoder
   container::ClipRecord clip;
   clip.id = prepared_.pose.track.clip_id;
   clip.name = summary_.clip;
-  clip.frame_rate = options_.frame_rate;
-  clip.frame_count = prepared_.frames;
+  clip.tick_rate = options_.frame_rate;
+  clip.frame_count = clip.duration_ticks = prepared_.frames;
   clip.loop = options_.loop && prepared_.frames > 1;
   for (int a = 0; a < 3; ++a) {
     clip.bounds_min[static_cast<std::size_t>(a)] = bounds_min_[a];

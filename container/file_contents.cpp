@@ -43,22 +43,67 @@ Status take(FileContents& contents, ReferenceChecker& references, Record&& recor
                                        status.error().message);
 }
 
+bool is_damage(const Error& error) {
+  return error.code == ErrorCode::kCorrupt || error.code == ErrorCode::kTruncated;
+}
+
+/// The static records as they stand in the file, with gaps where one is damaged.
+struct Gathered {
+  std::vector<std::optional<Record>> records;
+  std::optional<Error> damage;  ///< the first
+  bool framing_lost = false;    ///< behind the last record: nothing is known of what follows
+};
+
+Result<Gathered> gather(Reader& reader) {
+  Gathered found;
+  for (;;) {
+    const auto ended = reader.static_part_ended();
+    if (ended && *ended) return found;
+    auto record = ended ? reader.next() : Result<std::optional<Record>>(Unexpected{ended.error()});
+    if (record && !*record) return found;
+    if (record) {
+      found.records.push_back(std::move(*record));
+      continue;
+    }
+    if (!is_damage(record.error())) return Unexpected{record.error()};
+    if (!found.damage) found.damage = record.error();
+    found.framing_lost = !reader.can_continue();
+    if (found.framing_lost) return found;
+    found.records.emplace_back();
+  }
+}
+
+/// Fills the gaps with copies and returns how many. Errors: the damage, where a gap has none.
+Result<std::uint32_t> repair(Reader& reader, Gathered& found) {
+  const auto copies = reader.read_copies();
+  // The framing may as well be lost behind the last of them, at the first segment.
+  const bool complete = found.framing_lost && !found.records.empty() &&
+                        std::ranges::all_of(found.records, [](auto& r) { return r.has_value(); }) &&
+                        found.records.back()->type == types::kLayer;
+  if (!copies && complete) return 0u;
+  if (!copies) return Unexpected{*found.damage};
+  const bool cut = found.framing_lost && found.records.size() < copies->size();
+  if (cut) found.records.resize(copies->size());
+  std::uint32_t filled = 0;
+  for (std::size_t i = 0; i < found.records.size(); ++i) {
+    if (found.records[i]) continue;
+    if (i >= copies->size() || !(*copies)[i]) return Unexpected{*found.damage};
+    found.records[i] = (*copies)[i];
+    ++filled;
+  }
+  if (cut) RELIT_TRY(reader.resync());
+  return filled;
+}
+
 Result<FileContents> load(Reader& reader) {
   FileContents contents;
   contents.header = reader.header();
-  ReferenceChecker references;
-  for (;;) {
-    const auto ended = reader.static_part_ended();
-    if (!ended) {
-      const auto code = ended.error().code;
-      const bool damage = code == ErrorCode::kCorrupt || code == ErrorCode::kTruncated;
-      if (!damage || contents.layers.empty()) return Unexpected{ended.error()};
-    }
-    if (!ended || *ended) break;
-    RELIT_ASSIGN(auto record, reader.next());
-    if (!record) break;
-    RELIT_TRY(take(contents, references, std::move(*record)));
+  RELIT_ASSIGN(Gathered found, gather(reader));
+  if (found.damage) {
+    RELIT_ASSIGN(contents.repaired, repair(reader, found));
   }
+  ReferenceChecker references;
+  for (auto& record : found.records) RELIT_TRY(take(contents, references, std::move(*record)));
   if (auto status = references.finish(); !status)
     return fail(status.error().code, "records before byte " +
                                          std::to_string(reader.offset_bytes()) + ": " +

@@ -15,7 +15,7 @@
 namespace relit::container {
 
 inline constexpr std::uint16_t kVersionMajor = 0;
-inline constexpr std::uint16_t kVersionMinor = 1;
+inline constexpr std::uint16_t kVersionMinor = 2;
 
 inline constexpr std::array<std::uint8_t, 8> kSignature{0x89, 'R',  'L',  'T',
                                                         0x0D, 0x0A, 0x1A, 0x0A};
@@ -24,9 +24,10 @@ inline constexpr std::array<std::uint8_t, 16> kSegmentMarker{
     0xF3, 0x52, 0x9C, 0x0B, 0xE6, 0xD1, 0x7A, 0x38, 0xC4, 0x1F, 0xA9, 0x65, 0x0E, 0xB2, 0x87, 0x5D};
 inline constexpr std::size_t kRecordHeaderBytes = 24;
 inline constexpr std::size_t kRecordAlignment = 8;
-inline constexpr std::size_t kEndPayloadBytes = 16;
-/// A segment record of limits::kChunksPerSegment chunks.
-inline constexpr std::size_t kMostSegmentPayloadBytes = 40 + 16 * limits::kChunksPerSegment;
+inline constexpr std::size_t kEndPayloadBytes = 24;
+/// A segment record of limits::kChunksPerSegment chunks and limits::kFramesPerSegment durations.
+inline constexpr std::size_t kMostSegmentPayloadBytes =
+    52 + 16 * limits::kChunksPerSegment + 4 * limits::kFramesPerSegment;
 
 /// Four ASCII letters, the first in the lowest byte. Any value can come out of a file; the
 /// enumerators are those that this version knows.

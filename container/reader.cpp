@@ -147,6 +147,8 @@ Result<std::optional<RecordHeader>> Reader::peek_known() {
       continue;
     }
     if (segment_ || finished_) return *peeked;  // for check_place() to refuse
+    if (copy && order < kSegmentOrder && order_ == kSegmentOrder && copies_offset_ == 0)
+      copies_offset_ = offset;
     input_.skip();
   }
 }
@@ -246,7 +248,8 @@ Result<RecordBody> Reader::accept(RecordBody body, std::uint64_t offset) {
 Status Reader::accept_segment(const SegmentRecord& segment) {
   if (const auto sought = std::exchange(sought_, std::nullopt)) {
     if (segment.index != sought->segment_index || segment.clip_id != sought->clip_id ||
-        segment.first_frame != sought->first_frame || segment.frame_count != sought->frame_count)
+        segment.first_frame != sought->first_frame || segment.frame_count != sought->frame_count ||
+        segment.first_tick != sought->first_tick)
       return fail(ErrorCode::kCorrupt,
                   "segment " + std::to_string(segment.index) + " is not what the index says of it");
   }
@@ -268,6 +271,9 @@ Status Reader::accept_end(const EndRecord& end, std::uint64_t offset) const {
   if (index_offset_ != end.index_offset && !(jumped_ && index_offset_ == 0))
     return fail(ErrorCode::kCorrupt,
                 "the index should be at byte " + std::to_string(end.index_offset));
+  if (copies_offset_ != end.copies_offset && !(jumped_ && copies_offset_ == 0))
+    return fail(ErrorCode::kCorrupt,
+                "the copies should be at byte " + std::to_string(end.copies_offset));
   return {};
 }
 
@@ -323,14 +329,12 @@ Result<RecordBody> read_alone(RecordInput& input, RecordType type) {
   return fail(body.error().code, place(type, offset) + ": " + body.error().message);
 }
 
-Result<IndexRecord> read_index_from_end(ByteSource& source, const ReaderOptions& options) {
+Result<EndRecord> read_end(RecordInput& input, std::uint64_t size) {
   constexpr std::uint64_t kEndBytes = record_bytes(kEndPayloadBytes);
-  const std::uint64_t size = *source.size();
   if (size % kRecordAlignment != 0 || size < kSignature.size() + kEndBytes)
     return fail(ErrorCode::kNotFound,
                 "the file does not end with an end record, so there is no "
                 "index to find");
-  RecordInput input(source, 0, options.verify_checksums);
   RELIT_TRY(input.seek(size - kEndBytes));
   auto end_body = read_alone(input, types::kEnd);
   if (!end_body) {
@@ -339,27 +343,81 @@ Result<IndexRecord> read_index_from_end(ByteSource& source, const ReaderOptions&
     return fail(absent ? ErrorCode::kNotFound : code, end_body.error().message);
   }
   const auto end = std::get<EndRecord>(*end_body);
-  if (end.index_offset == 0) return fail(ErrorCode::kNotFound, "the file has no index");
   if (end.file_bytes != size)
     return fail(ErrorCode::kCorrupt,
                 place(types::kEnd, size - kEndBytes) + ": the file should have " +
                     std::to_string(end.file_bytes) + " bytes, it has " + std::to_string(size));
+  return end;
+}
+
+Result<IndexRecord> read_index_from_end(RecordInput& input, std::uint64_t size) {
+  RELIT_ASSIGN(const EndRecord end, read_end(input, size));
+  if (end.index_offset == 0) return fail(ErrorCode::kNotFound, "the file has no index");
   RELIT_TRY(input.seek(end.index_offset));
   RELIT_ASSIGN(auto index, read_alone(input, types::kIndex));
   return std::get<IndexRecord>(std::move(index));
 }
 
+Result<std::vector<std::optional<Record>>> read_copies_from_end(RecordInput& input,
+                                                                std::uint64_t size,
+                                                                const ReaderOptions& options) {
+  RELIT_ASSIGN(const EndRecord end, read_end(input, size));
+  if (end.copies_offset == 0) return fail(ErrorCode::kNotFound, "the file has no copies");
+  RELIT_TRY(input.seek(end.copies_offset));
+  std::vector<std::optional<Record>> records;
+  std::uint64_t bytes = 0;
+  for (;;) {
+    const auto header = input.peek();
+    // Lost framing costs the copies behind it and no more.
+    if (!header || !*header) return records;
+    const RecordType type = (*header)->type;
+    const int order = order_of(type);
+    if (order >= kSegmentOrder) return records;
+    if (order < 0 || (*header)->flags != flags::kCopy || type == types::kHeader) {
+      input.skip();
+      continue;
+    }
+    bytes += (*header)->payload_bytes;
+    if (bytes > options.max_static_bytes || (*header)->payload_bytes > options.max_record_bytes)
+      return fail(ErrorCode::kLimit, "the copies exceed the limit of " +
+                                         std::to_string(options.max_static_bytes) + " bytes");
+    const std::uint64_t offset = input.offset_bytes();
+    auto body = [&]() -> Result<RecordBody> {
+      RELIT_ASSIGN(const auto payload, input.payload());
+      return parse_body(type, payload);
+    }();
+    if (body)
+      records.emplace_back(Record{type, offset, std::move(*body)});
+    else
+      records.emplace_back();
+  }
+}
+
 }  // namespace
 
-Result<IndexRecord> Reader::read_index() {
+/// Runs `read` on an input of its own; the reader then stands where it stood.
+template <class Read>
+auto Reader::read_aside(Read&& read)
+    -> decltype(read(std::declval<RecordInput&>(), std::uint64_t{})) {
   if (!source_->seekable() || !source_->size())
     return fail(ErrorCode::kUnsupported,
-                "the index cannot be read from a source that only goes "
-                "forward");
+                "what stands at the end cannot be read from a source that only goes forward");
   const std::uint64_t resume = input_.source_offset_bytes();
-  auto index = read_index_from_end(*source_, options_);
+  RecordInput input(*source_, 0, options_.verify_checksums);
+  auto found = read(input, *source_->size());
   RELIT_TRY(source_->seek(resume));
-  return index;
+  return found;
+}
+
+Result<IndexRecord> Reader::read_index() {
+  return read_aside(
+      [](RecordInput& input, std::uint64_t size) { return read_index_from_end(input, size); });
+}
+
+Result<std::vector<std::optional<Record>>> Reader::read_copies() {
+  return read_aside([this](RecordInput& input, std::uint64_t size) {
+    return read_copies_from_end(input, size, options_);
+  });
 }
 
 Status Reader::seek_to_segment(const IndexRecord::Entry& entry) {

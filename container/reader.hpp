@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -94,6 +95,10 @@ class Reader {
   /// kUnsupported if the source cannot seek, kNotFound if the file has no end record or no index,
   /// else as next().
   Result<IndexRecord> read_index();
+  /// The copies of the static records, in the order of the file and without the header's; nothing
+  /// in the place of a damaged one. The reader then stands where it stood. Errors: as read_index(),
+  /// kNotFound if the file has no copies.
+  Result<std::vector<std::optional<Record>>> read_copies();
   /// Goes to a segment; next() gives its SegmentRecord. Errors: as next(), kUnsupported if the
   /// source cannot seek. kCorrupt, here or from next(), if the segment is not what the index says.
   Status seek_to_segment(const IndexRecord::Entry& entry);
@@ -116,6 +121,8 @@ class Reader {
   Unexpected damaged(const Error& error, RecordType type, std::uint64_t offset);
   void count_damage(const Error& error);
   void enter_segments();
+  template <class Read>
+  auto read_aside(Read&& read) -> decltype(read(std::declval<RecordInput&>(), std::uint64_t{}));
 
   std::unique_ptr<ByteSource> source_;
   ReaderOptions options_;
@@ -129,8 +136,9 @@ class Reader {
   std::optional<IndexRecord::Entry> sought_;
   std::optional<std::vector<std::uint32_t>> wanted_;  ///< sorted
   std::uint64_t static_bytes_ = 0;
-  std::uint64_t index_offset_ = 0;  ///< 0: not seen
-  bool jumped_ = false;             ///< by seek or resync: what was not seen may be there
+  std::uint64_t index_offset_ = 0;   ///< 0: not seen
+  std::uint64_t copies_offset_ = 0;  ///< of the first copy behind a segment; 0: not seen
+  bool jumped_ = false;              ///< by seek or resync: what was not seen may be there
   bool finished_ = false;
   std::optional<Error> fatal_;
   std::uint64_t damaged_records_ = 0;
@@ -140,6 +148,7 @@ class Reader {
 /// Everything before the first segment.
 struct FileContents {
   HeaderRecord header;
+  std::uint32_t repaired = 0;     ///< records that were damaged and taken from their copies
   std::vector<ClipRecord> clips;  ///< at least one; all vectors in the order of the file
   std::vector<ImageRecord> images;
   std::vector<MaterialRecord> materials;
@@ -157,8 +166,8 @@ struct FileContents {
 };
 
 /// Reads everything before the first segment from a reader that has just been opened, and checks
-/// what the records say about each other. next() then gives the first segment. Errors: as
-/// Reader::next().
+/// what the records say about each other. Damaged records are taken from their copies where the
+/// source can seek. next() then gives the first segment. Errors: as Reader::next().
 Result<FileContents> load_static(Reader& reader);
 
 }  // namespace relit::container

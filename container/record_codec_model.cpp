@@ -112,6 +112,7 @@ std::vector<std::uint8_t> serialize(const LayerRecord& record) {
   w.u8(record.bit_depth);
   w.u8(static_cast<std::uint8_t>(record.chroma));
   w.boolean(record.lossless);
+  w.u8(record.mantissa_pictures);
   w.boolean(record.has_exponents);
   if (record.has_exponents) {
     w.u32(record.exponent_track);
@@ -120,6 +121,7 @@ std::vector<std::uint8_t> serialize(const LayerRecord& record) {
     w.u16(record.exponent_width);
     w.u16(record.exponent_height);
     w.u8(record.exponent_block);
+    w.u8(record.exponent_pictures);
   }
   w.u32(static_cast<std::uint32_t>(record.planes.size()));
   for (const PlaneRecord& p : record.planes) {
@@ -146,6 +148,7 @@ void read_exponents(ByteReader& r, LayerRecord& record) {
   record.exponent_width = r.u16("exponent_width");
   record.exponent_height = r.u16("exponent_height");
   record.exponent_block = r.u8("exponent_block");
+  record.exponent_pictures = r.u8("exponent_pictures");
 }
 
 void read_planes(ByteReader& r, LayerRecord& record) {
@@ -179,6 +182,7 @@ Result<LayerRecord> parse_layer(std::span<const std::uint8_t> payload) {
   record.bit_depth = r.u8("bit_depth");
   record.chroma = r.enumeration("chroma", Chroma::k444);
   record.lossless = r.boolean("lossless");
+  record.mantissa_pictures = r.u8("mantissa_pictures");
   record.has_exponents = r.boolean("has_exponents");
   if (record.has_exponents) read_exponents(r, record);
   read_planes(r, record);
@@ -197,6 +201,7 @@ Status validate_exponents(const LayerRecord& record) {
       at_most(record.exponent_private.size(), limits::kCodecPrivateBytes, "exponent_private"));
   RELIT_TRY(one_to(record.exponent_width, limits::kVideoSide, "exponent_width"));
   RELIT_TRY(one_to(record.exponent_height, limits::kVideoSide, "exponent_height"));
+  RELIT_TRY(one_to(record.exponent_pictures, limits::kDecoderPictures, "exponent_pictures"));
   return require(
       std::has_single_bit(record.exponent_block) && record.exponent_block <= 32,
       "exponent_block " + std::to_string(record.exponent_block) + " is not 1, 2, 4, 8, 16 or 32");
@@ -252,6 +257,7 @@ Status validate(const LayerRecord& record) {
   RELIT_TRY(require(record.bit_depth == 8 || record.bit_depth == 10,
                     "bit_depth " + std::to_string(record.bit_depth) + " is neither 8 nor 10"));
   RELIT_TRY(known(record.chroma, Chroma::k444, "chroma"));
+  RELIT_TRY(one_to(record.mantissa_pictures, limits::kDecoderPictures, "mantissa_pictures"));
   if (record.has_exponents) RELIT_TRY(validate_exponents(record));
   RELIT_TRY(one_to(record.planes.size(), limits::kPlanes, "number of planes"));
   for (std::size_t i = 0; i < record.planes.size(); ++i) {

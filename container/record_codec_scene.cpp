@@ -30,6 +30,10 @@ Result<HeaderRecord> parse_header(std::span<const std::uint8_t> payload) {
                 "the file has format version " + std::to_string(record.version_major) + "." +
                     std::to_string(record.version_minor) + ", this reader knows versions up to " +
                     std::to_string(kVersionMajor) + ".x: a newer relit is needed");
+  if (r.ok() && record.version_major == 0 && record.version_minor < kVersionMinor)
+    return fail(ErrorCode::kUnsupported,
+                "the file has format version 0." + std::to_string(record.version_minor) +
+                    ", a draft that this reader no longer knows: write it again");
   r.zero_u32("reserved");
   record.writer = r.string("writer", limits::kStringBytes);
   RELIT_TRY(r.finish());
@@ -43,9 +47,10 @@ std::vector<std::uint8_t> serialize(const ClipRecord& record) {
   ByteWriter w;
   w.u32(record.id);
   w.string(record.name);
-  w.u32(static_cast<std::uint32_t>(record.frame_rate.num));
-  w.u32(static_cast<std::uint32_t>(record.frame_rate.den));
+  w.u32(static_cast<std::uint32_t>(record.tick_rate.num));
+  w.u32(static_cast<std::uint32_t>(record.tick_rate.den));
   w.u64(record.frame_count);
+  w.u64(record.duration_ticks);
   w.boolean(record.loop);
   w.f32s(record.bounds_min);
   w.f32s(record.bounds_max);
@@ -57,9 +62,10 @@ Result<ClipRecord> parse_clip(std::span<const std::uint8_t> payload) {
   ClipRecord record;
   record.id = r.u32("id");
   record.name = r.string("name", limits::kStringBytes);
-  record.frame_rate.num = r.u32("frame_rate.num");
-  record.frame_rate.den = r.u32("frame_rate.den");
+  record.tick_rate.num = r.u32("tick_rate.num");
+  record.tick_rate.den = r.u32("tick_rate.den");
   record.frame_count = r.u64("frame_count");
+  record.duration_ticks = r.u64("duration_ticks");
   record.loop = r.boolean("loop");
   record.bounds_min = r.f32s<3>("bounds_min");
   record.bounds_max = r.f32s<3>("bounds_max");
@@ -70,12 +76,17 @@ Result<ClipRecord> parse_clip(std::span<const std::uint8_t> payload) {
 
 Status validate(const ClipRecord& record) {
   RELIT_TRY(text(record.name, "name"));
-  const auto& rate = record.frame_rate;
+  const auto& rate = record.tick_rate;
   RELIT_TRY(require(rate.num > 0 && rate.den > 0 && rate.num <= limits::kRational &&
                         rate.den <= limits::kRational,
-                    "frame_rate " + std::to_string(rate.num) + "/" + std::to_string(rate.den) +
+                    "tick_rate " + std::to_string(rate.num) + "/" + std::to_string(rate.den) +
                         " is not a fraction of two integers in 1..2147483647"));
   RELIT_TRY(one_to(record.frame_count, limits::kFrames, "frame_count"));
+  RELIT_TRY(one_to(record.duration_ticks, limits::kTicks, "duration_ticks"));
+  RELIT_TRY(require(record.duration_ticks >= record.frame_count,
+                    "duration_ticks " + std::to_string(record.duration_ticks) +
+                        " is less than one tick for each of " + std::to_string(record.frame_count) +
+                        " frames"));
   RELIT_TRY(finite(record.bounds_min, "bounds_min"));
   RELIT_TRY(finite(record.bounds_max, "bounds_max"));
   for (std::size_t i = 0; i < 3; ++i)

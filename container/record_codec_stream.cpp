@@ -14,7 +14,7 @@ using namespace checks;
 namespace {
 
 constexpr std::size_t kChunkSizeBytes = 16;
-constexpr std::size_t kIndexEntryBytes = 32;
+constexpr std::size_t kIndexEntryBytes = 40;
 constexpr std::size_t kPacketLeastBytes = 2;
 /// Two varints of at most ten bytes.
 constexpr std::uint64_t kTableBytes = 20 * std::uint64_t{limits::kPacketsPerChunk};
@@ -37,12 +37,15 @@ std::vector<std::uint8_t> serialize(const SegmentRecord& record) {
   w.u32(record.clip_id);
   w.u64(record.first_frame);
   w.u32(record.frame_count);
+  w.u64(record.first_tick);
   w.u32(static_cast<std::uint32_t>(record.chunks.size()));
   for (const auto& chunk : record.chunks) {
     w.u32(chunk.track_id);
     w.u32(0);
     w.u64(chunk.chunk_bytes);
   }
+  w.u32(static_cast<std::uint32_t>(record.durations.size()));
+  for (const std::uint32_t ticks : record.durations) w.u32(ticks);
   return w.take();
 }
 
@@ -56,12 +59,15 @@ Result<SegmentRecord> parse_segment(std::span<const std::uint8_t> payload) {
   record.clip_id = r.u32("clip_id");
   record.first_frame = r.u64("first_frame");
   record.frame_count = r.u32("frame_count");
+  record.first_tick = r.u64("first_tick");
   record.chunks.resize(r.count("chunks", limits::kChunksPerSegment, kChunkSizeBytes));
   for (auto& chunk : record.chunks) {
     chunk.track_id = r.u32("chunk.track_id");
     r.zero_u32("chunk.reserved");
     chunk.chunk_bytes = r.u64("chunk.chunk_bytes");
   }
+  record.durations.resize(r.count("durations", limits::kFramesPerSegment, 4));
+  for (std::uint32_t& ticks : record.durations) ticks = r.u32("durations");
   RELIT_TRY(r.finish());
   RELIT_TRY(validate(record));
   return record;
@@ -71,6 +77,13 @@ Status validate(const SegmentRecord& record) {
   RELIT_TRY(require(record.index < limits::kSegments,
                     "index is not below " + std::to_string(limits::kSegments)));
   RELIT_TRY(frame_range(record.first_frame, record.frame_count));
+  RELIT_TRY(require(record.durations.empty() || record.durations.size() == record.frame_count,
+                    "there are " + std::to_string(record.durations.size()) + " durations for " +
+                        std::to_string(record.frame_count) + " frames"));
+  RELIT_TRY(require(std::ranges::find(record.durations, 0u) == record.durations.end(),
+                    "a frame lasts no tick"));
+  RELIT_TRY(at_most(record.first_tick, limits::kTicks, "first_tick"));
+  RELIT_TRY(at_most(record.first_tick + duration_ticks(record), limits::kTicks, "end in ticks"));
   RELIT_TRY(at_most(record.chunks.size(), limits::kChunksPerSegment, "number of chunks"));
   std::vector<std::uint32_t> tracks;
   for (const auto& chunk : record.chunks) {
@@ -187,6 +200,7 @@ std::vector<std::uint8_t> serialize(const IndexRecord& record) {
     w.u64(e.first_frame);
     w.u32(e.frame_count);
     w.u32(0);
+    w.u64(e.first_tick);
     w.u64(e.offset);
   }
   return w.take();
@@ -204,6 +218,7 @@ Result<IndexRecord> parse_index(std::span<const std::uint8_t> payload) {
     e.first_frame = r.u64("first_frame");
     e.frame_count = r.u32("frame_count");
     r.zero_u32("entry.reserved");
+    e.first_tick = r.u64("first_tick");
     e.offset = r.u64("offset");
   }
   RELIT_TRY(r.finish());
@@ -217,6 +232,7 @@ Status validate(const IndexRecord& record) {
   for (const auto& e : record.segments) {
     RELIT_TRY(require(e.segment_index < limits::kSegments, "segment_index is too large"));
     RELIT_TRY(frame_range(e.first_frame, e.frame_count));
+    RELIT_TRY(at_most(e.first_tick, limits::kTicks, "first_tick"));
     RELIT_TRY(require(e.offset % kRecordAlignment == 0 && e.offset >= kSignature.size(),
                       "offset " + std::to_string(e.offset) + " is not that of a record"));
     RELIT_TRY(require(previous == nullptr || (previous->segment_index < e.segment_index &&
@@ -230,6 +246,7 @@ Status validate(const IndexRecord& record) {
 std::vector<std::uint8_t> serialize(const EndRecord& record) {
   ByteWriter w;
   w.u64(record.index_offset);
+  w.u64(record.copies_offset);
   w.u64(record.file_bytes);
   return w.take();
 }
@@ -238,6 +255,7 @@ Result<EndRecord> parse_end(std::span<const std::uint8_t> payload) {
   ByteReader r(payload);
   EndRecord record;
   record.index_offset = r.u64("index_offset");
+  record.copies_offset = r.u64("copies_offset");
   record.file_bytes = r.u64("file_bytes");
   RELIT_TRY(r.finish());
   RELIT_TRY(validate(record));
@@ -248,9 +266,11 @@ Status validate(const EndRecord& record) {
   RELIT_TRY(require(record.file_bytes % kRecordAlignment == 0 &&
                         record.file_bytes >= kSignature.size() + record_bytes(kEndPayloadBytes),
                     "file_bytes is not the length of a file"));
-  return require(record.index_offset % kRecordAlignment == 0 &&
-                     record.index_offset <= record.file_bytes - record_bytes(kEndPayloadBytes),
-                 "index_offset does not lie in the file before the end record");
+  const std::uint64_t end = record.file_bytes - record_bytes(kEndPayloadBytes);
+  RELIT_TRY(require(record.index_offset % kRecordAlignment == 0 && record.index_offset <= end,
+                    "index_offset does not lie in the file before the end record"));
+  return require(record.copies_offset % kRecordAlignment == 0 && record.copies_offset <= end,
+                 "copies_offset does not lie in the file before the end record");
 }
 
 }  // namespace relit::container

@@ -25,22 +25,29 @@ using Affine = std::array<float, 12>;
 
 struct HeaderRecord {
   std::uint16_t version_major = 0;
-  std::uint16_t version_minor = 1;
+  std::uint16_t version_minor = 2;
   std::string writer;  ///< name and version of the program that wrote the file
   bool operator==(const HeaderRecord&) const = default;
 };
 
-/// One animation. Frame k is shown from k to k+1 frame durations; frame times are k / frame_rate.
+/// One animation. Time is counted in ticks, exactly; a frame lasts one tick where its segment does
+/// not say otherwise, so that the tick rate of an evenly spaced clip is its frame rate.
 struct ClipRecord {
   std::uint32_t id = 0;
   std::string name;
-  Rational frame_rate{50, 1};  ///< frames per second, > 0
+  Rational tick_rate{50, 1};  ///< ticks per second, > 0
   std::uint64_t frame_count = 0;
   bool loop = false;
   std::array<float, 3> bounds_min{};  ///< of the posed meshes over the whole clip, metres
   std::array<float, 3> bounds_max{};
+  std::uint64_t duration_ticks = 0;  ///< at least frame_count; more: unevenly spaced
   bool operator==(const ClipRecord&) const = default;
 };
+
+[[nodiscard]] inline double duration_s(const ClipRecord& clip) {
+  return static_cast<double>(clip.duration_ticks) * static_cast<double>(clip.tick_rate.den) /
+         static_cast<double>(clip.tick_rate.num);
+}
 
 /// An image as its encoder left it.
 struct ImageRecord {
@@ -241,6 +248,7 @@ struct LayerRecord {
   std::uint8_t bit_depth = 8;  ///< 8 or 10
   Chroma chroma = Chroma::k420;
   bool lossless = false;
+  std::uint8_t mantissa_pictures = 1;  ///< that a decoder has to keep at once: FORMAT.md, LAYR
 
   bool has_exponents = false;  ///< without them the exponent_* fields are ignored and not stored
   std::uint32_t exponent_track = 0;
@@ -249,6 +257,7 @@ struct LayerRecord {
   std::uint16_t exponent_width = 0;
   std::uint16_t exponent_height = 0;
   std::uint8_t exponent_block = 1;  ///< side of the exponent block in texels: 1, 2, 4, 8, 16 or 32
+  std::uint8_t exponent_pictures = 1;
 
   std::vector<PlaneRecord> planes;
   bool operator==(const LayerRecord&) const = default;
@@ -268,8 +277,17 @@ struct SegmentRecord {
     bool operator==(const ChunkSize&) const = default;
   };
   std::vector<ChunkSize> chunks;
+  std::uint64_t first_tick = 0;          ///< when the first frame is shown
+  std::vector<std::uint32_t> durations;  ///< ticks of each frame; empty: one tick each
   bool operator==(const SegmentRecord&) const = default;
 };
+
+/// Ticks from the first frame of the segment to the end of its last.
+[[nodiscard]] inline std::uint64_t duration_ticks(const SegmentRecord& segment) {
+  std::uint64_t sum = segment.durations.empty() ? segment.frame_count : 0;
+  for (const std::uint32_t ticks : segment.durations) sum += ticks;
+  return sum;
+}
 
 /// One coded packet. Packets stand in decoding order; pts counts frames of the clip.
 struct Packet {
@@ -296,6 +314,7 @@ struct IndexRecord {
     std::uint64_t first_frame = 0;
     std::uint32_t frame_count = 0;
     std::uint64_t offset = 0;  ///< of the segment record, from the start of the file
+    std::uint64_t first_tick = 0;
     bool operator==(const Entry&) const = default;
   };
   std::vector<Entry> segments;
@@ -307,6 +326,8 @@ struct EndRecord {
   std::uint64_t index_offset =
       0;  ///< of the index record, from the start of the file; 0: there is none
   std::uint64_t file_bytes = 0;  ///< of the whole file, this record included
+  std::uint64_t copies_offset =
+      0;  ///< of the first copy of a static record behind the segments; 0: there are none
   bool operator==(const EndRecord&) const = default;
 };
 

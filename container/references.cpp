@@ -30,7 +30,11 @@ Status exists(const Ids& ids, std::uint32_t id, const char* what) {
 }  // namespace
 
 Status ReferenceChecker::add(const ClipRecord& record) {
-  RELIT_TRY(require(clips_.emplace(record.id, Clip{record.frame_count, false, {}}).second,
+  Clip clip;
+  clip.frame_count = record.frame_count, clip.duration_ticks = record.duration_ticks;
+  clip.ticks_per_s =
+      static_cast<double>(record.tick_rate.num) / static_cast<double>(record.tick_rate.den);
+  RELIT_TRY(require(clips_.emplace(record.id, std::move(clip)).second,
                     label("clip", record.id) + " exists twice"));
   return at_most(clips_.size(), limits::kClips, "number of clips");
 }
@@ -106,6 +110,9 @@ Status ReferenceChecker::add(const LayerRecord& record) {
   Clip& clip = clips_.at(model.clip_id);
   RELIT_TRY(add_track(record.mantissa_track, clip));
   if (record.has_exponents) RELIT_TRY(add_track(record.exponent_track, clip));
+  clip.samples_per_frame += std::uint64_t{record.coded_width} * record.coded_height;
+  if (record.has_exponents)
+    clip.samples_per_frame += std::uint64_t{record.exponent_width} * record.exponent_height;
   model.planes += static_cast<std::uint32_t>(record.planes.size());
   RELIT_TRY(at_most(model.planes, limits::kPlanes, "number of planes of the model"));
   for (const PlaneRecord& p : record.planes) {
@@ -137,13 +144,33 @@ Status ReferenceChecker::finish() const {
                       label("model", id) + " predicts from plane " +
                           std::to_string(model.prediction_plane) + " of " +
                           std::to_string(model.planes)));
+  for (const auto& [id, clip] : clips_) RELIT_TRY(check_rate(id, clip));
   return {};
+}
+
+/// A small file must not keep a decoder busy for years.
+Status ReferenceChecker::check_rate(std::uint32_t clip_id, const Clip& clip) {
+  const auto samples =
+      static_cast<double>(clip.samples_per_frame) * static_cast<double>(clip.frame_count);
+  const double per_s = samples * clip.ticks_per_s / static_cast<double>(clip.duration_ticks);
+  if (samples <= static_cast<double>(limits::kVideoSamples) &&
+      per_s <= static_cast<double>(limits::kVideoSamplesPerSecond))
+    return {};
+  return fail(ErrorCode::kLimit, label("clip", clip_id) + " has " + std::to_string(samples) +
+                                     " samples of video, " + std::to_string(per_s) +
+                                     " a second; the limits are 2^48 and 2^33");
 }
 
 std::optional<std::uint64_t> ReferenceChecker::frame_count(std::uint32_t clip_id) const {
   const auto it = clips_.find(clip_id);
   if (it == clips_.end()) return std::nullopt;
   return it->second.frame_count;
+}
+
+std::optional<std::uint64_t> ReferenceChecker::duration_ticks(std::uint32_t clip_id) const {
+  const auto it = clips_.find(clip_id);
+  if (it == clips_.end()) return std::nullopt;
+  return it->second.duration_ticks;
 }
 
 std::vector<std::uint32_t> ReferenceChecker::clips() const {

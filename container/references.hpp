@@ -33,6 +33,7 @@ class ReferenceChecker {
   [[nodiscard]] Status finish() const;
 
   [[nodiscard]] std::optional<std::uint64_t> frame_count(std::uint32_t clip_id) const;
+  [[nodiscard]] std::optional<std::uint64_t> duration_ticks(std::uint32_t clip_id) const;
   /// All clips, by id.
   [[nodiscard]] std::vector<std::uint32_t> clips() const;
   /// The tracks of a clip in the order of their declaration: pose, then each layer's mantissas and
@@ -42,8 +43,11 @@ class ReferenceChecker {
  private:
   struct Clip {
     std::uint64_t frame_count = 0;
+    std::uint64_t duration_ticks = 0;
+    double ticks_per_s = 1;
     bool has_pose = false;
     std::vector<std::uint32_t> tracks;
+    std::uint64_t samples_per_frame = 0;  ///< of all mantissa and exponent pictures
   };
   struct Model {
     std::uint32_t clip_id = 0;
@@ -54,6 +58,7 @@ class ReferenceChecker {
   };
 
   Status add_track(std::uint32_t track_id, Clip& clip);
+  [[nodiscard]] static Status check_rate(std::uint32_t clip_id, const Clip& clip);
 
   std::map<std::uint32_t, Clip> clips_;
   std::set<std::uint32_t> images_;

@@ -12,14 +12,15 @@ namespace relit::container {
 
 using namespace checks;
 
-Result<Writer> Writer::create(ByteSink& sink, const std::string& program) {
-  Writer writer(sink);
+Result<Writer> Writer::create(ByteSink& sink, const std::string& program,
+                              const WriterOptions& options) {
+  Writer writer(sink, options);
   const HeaderRecord header{kVersionMajor, kVersionMinor, program};
   const auto write = [&]() -> Status {
     RELIT_TRY(validate(header));
     RELIT_TRY(writer.write_bytes(kSignature));
     RELIT_TRY(writer.enter(order_of(types::kHeader)));
-    return writer.write_record(types::kHeader, serialize(header));
+    return writer.write_static(types::kHeader, serialize(header));
   };
   RELIT_TRY(writer.settle(write(), "header"));
   return writer;
@@ -31,12 +32,18 @@ Status Writer::add_static(RecordType type, const R& record) {
     RELIT_TRY(enter(order_of(type)));
     RELIT_TRY(validate(record));
     RELIT_TRY(references_.add(record));
-    const auto payload = serialize(record);
+    auto payload = serialize(record);
     static_bytes_ += payload.size();
     RELIT_TRY(at_most(static_bytes_, limits::kStaticBytes, "size of all records before segments"));
-    return write_record(type, payload);
+    return write_static(type, std::move(payload));
   };
   return settle(write(), type_name(type).c_str());
+}
+
+Status Writer::write_static(RecordType type, std::vector<std::uint8_t> payload) {
+  RELIT_TRY(write_record(type, payload));
+  if (options_.copies) statics_.push_back({type, std::move(payload)});
+  return {};
 }
 
 Status Writer::add(const ClipRecord& record) { return add_static(types::kClip, record); }
@@ -63,8 +70,8 @@ Status Writer::check_segment(const SegmentInfo& info,
   const auto frame_count = references_.frame_count(info.clip_id);
   RELIT_TRY(
       require(frame_count.has_value(), "clip " + std::to_string(info.clip_id) + " does not exist"));
-  const auto done = frames_written_.find(info.clip_id);
-  const std::uint64_t expected = done == frames_written_.end() ? 0 : done->second;
+  const auto done = written_.find(info.clip_id);
+  const std::uint64_t expected = done == written_.end() ? 0 : done->second.frames;
   RELIT_TRY(require(info.first_frame == expected,
                     "the segment starts with frame " + std::to_string(info.first_frame) +
                         ", the next one of its clip is " + std::to_string(expected)));
@@ -90,11 +97,18 @@ Status Writer::write_segment(const SegmentInfo& info, std::vector<ChunkRecord> c
     const auto place = [&](const ChunkRecord& c) { return std::ranges::find(tracks, c.track_id); };
     std::ranges::sort(chunks, {}, place);
 
-    SegmentRecord segment{static_cast<std::uint32_t>(index_.segments.size()),
-                          info.clip_id,
-                          info.first_frame,
-                          info.frame_count,
-                          {}};
+    Written& written = written_[info.clip_id];
+    SegmentRecord segment;
+    segment.index = static_cast<std::uint32_t>(index_.segments.size());
+    segment.clip_id = info.clip_id;
+    segment.first_frame = info.first_frame;
+    segment.frame_count = info.frame_count;
+    segment.first_tick = written.ticks;
+    segment.durations = info.durations;
+    // What it says without a list need not be listed.
+    if (std::ranges::all_of(segment.durations, [](std::uint32_t t) { return t == 1; }) &&
+        segment.durations.size() == segment.frame_count)
+      segment.durations.clear();
     std::vector<std::vector<std::uint8_t>> payloads;
     for (ChunkRecord& chunk : chunks) {
       chunk.segment_index = segment.index;
@@ -105,11 +119,12 @@ Status Writer::write_segment(const SegmentInfo& info, std::vector<ChunkRecord> c
       chunk.data = {};
     }
     RELIT_TRY(validate(segment));
-    index_.segments.push_back(
-        {segment.index, segment.clip_id, segment.first_frame, segment.frame_count, offset_});
+    index_.segments.push_back({segment.index, segment.clip_id, segment.first_frame,
+                               segment.frame_count, offset_, segment.first_tick});
     RELIT_TRY(write_record(types::kSegment, serialize(segment)));
     for (const auto& payload : payloads) RELIT_TRY(write_record(types::kChunk, payload));
-    frames_written_[info.clip_id] = info.first_frame + info.frame_count;
+    written.frames = info.first_frame + info.frame_count;
+    written.ticks += duration_ticks(segment);
     return {};
   };
   return settle(write(), "segment");
@@ -119,18 +134,15 @@ Status Writer::finish() {
   const auto write = [&]() -> Status {
     if (order_ < order_of(types::kSegment)) RELIT_TRY(references_.finish());
     RELIT_TRY(enter(order_of(types::kIndex)));
-    for (const std::uint32_t clip : references_.clips()) {
-      const auto done = frames_written_.find(clip);
-      const std::uint64_t frames = done == frames_written_.end() ? 0 : done->second;
-      RELIT_TRY(require(references_.tracks(clip).empty() || frames == references_.frame_count(clip),
-                        "clip " + std::to_string(clip) + " has segments for " +
-                            std::to_string(frames) + " of its " +
-                            std::to_string(*references_.frame_count(clip)) + " frames"));
-    }
-    const EndRecord end{
-        offset_, offset_ + record_bytes(serialize(index_).size()) + record_bytes(kEndPayloadBytes)};
+    RELIT_TRY(check_complete());
+    EndRecord end;
+    end.copies_offset = statics_.empty() ? 0 : offset_;
+    for (const Stored& record : statics_)
+      RELIT_TRY(write_record(record.type, record.payload, flags::kCopy));
+    end.index_offset = offset_;
     RELIT_TRY(validate(index_));
     RELIT_TRY(write_record(types::kIndex, serialize(index_)));
+    end.file_bytes = offset_ + record_bytes(kEndPayloadBytes);
     RELIT_TRY(enter(order_of(types::kEnd)));
     return write_record(types::kEnd, serialize(end));
   };
@@ -139,9 +151,27 @@ Status Writer::finish() {
   return {};
 }
 
-Status Writer::write_record(RecordType type, std::span<const std::uint8_t> payload) {
+Status Writer::check_complete() const {
+  for (const std::uint32_t clip : references_.clips()) {
+    if (references_.tracks(clip).empty()) continue;
+    const auto done = written_.find(clip);
+    const Written written = done == written_.end() ? Written{} : done->second;
+    RELIT_TRY(require(written.frames == references_.frame_count(clip),
+                      "clip " + std::to_string(clip) + " has segments for " +
+                          std::to_string(written.frames) + " of its " +
+                          std::to_string(*references_.frame_count(clip)) + " frames"));
+    RELIT_TRY(require(written.ticks == references_.duration_ticks(clip),
+                      "the frames of clip " + std::to_string(clip) + " last " +
+                          std::to_string(written.ticks) + " of its " +
+                          std::to_string(*references_.duration_ticks(clip)) + " ticks"));
+  }
+  return {};
+}
+
+Status Writer::write_record(RecordType type, std::span<const std::uint8_t> payload,
+                            std::uint32_t record_flags) {
   RELIT_TRY(at_most(payload.size(), limits::kRecordBytes, "size of the record"));
-  RELIT_TRY(write_bytes(encode_header({type, 0, payload.size(), crc32(payload)})));
+  RELIT_TRY(write_bytes(encode_header({type, record_flags, payload.size(), crc32(payload)})));
   RELIT_TRY(write_bytes(payload));
   constexpr std::array<std::uint8_t, kRecordAlignment> kZeros{};
   return write_bytes(std::span(kZeros).first(padding_after(payload.size())));

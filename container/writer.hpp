@@ -19,6 +19,13 @@ struct SegmentInfo {
   std::uint32_t clip_id = 0;
   std::uint64_t first_frame = 0;
   std::uint32_t frame_count = 0;
+  std::vector<std::uint32_t> durations = {};  ///< ticks of each frame; empty: one tick each
+};
+
+struct WriterOptions {
+  /// Stores HEAD and all static records a second time, behind the segments, so that one hit cannot
+  /// cost the file. Players never read them unless the first ones are damaged.
+  bool copies = true;
 };
 
 /// Writes a .relit file from front to back:
@@ -33,7 +40,8 @@ class Writer {
  public:
   /// Writes signature and header. `program` is the name and version of the calling program. The
   /// sink stays the caller's, outlives the writer, and is not committed by it.
-  static Result<Writer> create(ByteSink& sink, const std::string& program);
+  static Result<Writer> create(ByteSink& sink, const std::string& program,
+                               const WriterOptions& options = {});
 
   Status add(const ClipRecord& record);
   Status add(const ImageRecord& record);
@@ -52,30 +60,43 @@ class Writer {
   /// frame 0; those of several clips may be mixed. `segment_index` of the chunks is filled in.
   Status write_segment(const SegmentInfo& info, std::vector<ChunkRecord> chunks);
 
-  /// Writes index and end record. Every clip that has tracks must be complete.
+  /// Writes copies, index and end record. Every clip that has tracks must be complete.
   Status finish();
 
   [[nodiscard]] std::uint64_t bytes_written() const { return offset_; }
 
  private:
-  explicit Writer(ByteSink& sink) : sink_(&sink) {}
+  Writer(ByteSink& sink, const WriterOptions& options) : sink_(&sink), options_(options) {}
 
   template <class R>
   Status add_static(RecordType type, const R& record);
   Status check_segment(const SegmentInfo& info, const std::vector<ChunkRecord>& chunks) const;
-  Status write_record(RecordType type, std::span<const std::uint8_t> payload);
+  Status write_record(RecordType type, std::span<const std::uint8_t> payload,
+                      std::uint32_t record_flags = 0);
+  Status write_static(RecordType type, std::vector<std::uint8_t> payload);
+  Status check_complete() const;
   Status write_bytes(std::span<const std::uint8_t> bytes);
   Status enter(int order);
   /// Closes the writer on failure; a breach of the format becomes kInvalid.
   Status settle(Status status, const char* doing);
 
   ByteSink* sink_;
+  WriterOptions options_;
   std::uint64_t offset_ = 0;
   int order_ = -1;  ///< order_of() of the last record
   bool closed_ = false;
   std::uint64_t static_bytes_ = 0;
   ReferenceChecker references_;
-  std::map<std::uint32_t, std::uint64_t> frames_written_;  ///< by clip
+  struct Written {
+    std::uint64_t frames = 0;
+    std::uint64_t ticks = 0;
+  };
+  std::map<std::uint32_t, Written> written_;  ///< by clip
+  struct Stored {
+    RecordType type;
+    std::vector<std::uint8_t> payload;
+  };
+  std::vector<Stored> statics_;  ///< to be copied
   IndexRecord index_;
 };
 

@@ -34,6 +34,7 @@ Status ClipReader::choose_clip(const std::string& wanted) {
     return fail(ErrorCode::kNotFound, name_ + ": no clip \"" + wanted + "\"; there are: " + names);
   }
   clip_ = *clip;
+  timeline_ = container::Timeline(clip_);
   const auto model =
       std::find_if(contents_.models.begin(), contents_.models.end(),
                    [&](const container::ModelRecord& m) { return m.clip_id == clip_.id; });
@@ -107,7 +108,8 @@ Status ClipReader::take(container::Record record) {
       return {};
     }
     seen_.push_back({segment->index, segment->clip_id, segment->first_frame, segment->frame_count,
-                     record.offset_bytes});
+                     record.offset_bytes, segment->first_tick});
+    timeline_.add(*segment);
     segment_ = std::move(*segment);
     for (const auto& chunk : segment_->chunks) {
       if (std::binary_search(tracks_.begin(), tracks_.end(), chunk.track_id))
@@ -152,17 +154,21 @@ Status ClipReader::read_until(std::uint64_t index) {
   return {};
 }
 
+// A file without an index was cut, or is still being written: what has been read so far serves as
+// one.
+Status ClipReader::load_index() {
+  if (index_ || !reader_.seekable()) return {};
+  auto found = reader_.read_index();
+  if (!found && found.error().code == ErrorCode::kIo) return in_file(found.error());
+  index_ = found ? std::move(*found) : container::IndexRecord{};
+  return {};
+}
+
 // Goes to the segment of a frame that is not the next one, where the source can seek and the place
 // is known.
 Result<bool> ClipReader::jump(std::uint64_t index) {
   if (!reader_.seekable()) return false;
-  if (!index_) {
-    // A file without an index was cut, or is still being written: what has been read so far serves
-    // as one.
-    auto found = reader_.read_index();
-    if (!found && found.error().code == ErrorCode::kIo) return in_file(found.error());
-    index_ = found ? std::move(*found) : container::IndexRecord{};
-  }
+  RELIT_TRY(load_index());
   const auto holds = [&](const container::IndexRecord::Entry& e) {
     return e.clip_id == clip_.id && e.first_frame <= index && index < e.first_frame + e.frame_count;
   };
@@ -212,6 +218,46 @@ Status ClipReader::frame(std::uint64_t index, ClipFrame& out) {
   if (!shown_) return in_file(decoded.error());
   ++loss_.frames;
   return {};
+}
+
+Result<std::uint64_t> ClipReader::frame_at(std::uint64_t tick) {
+  if (tick >= clip_.duration_ticks) {
+    return fail(ErrorCode::kNotFound, name_ + ": clip \"" + clip_.name + "\" has ended at " +
+                                          std::to_string(static_cast<double>(tick) *
+                                                         static_cast<double>(clip_.tick_rate.den) /
+                                                         static_cast<double>(clip_.tick_rate.num)) +
+                                          " s");
+  }
+  if (const auto known = timeline_.frame_at(tick)) return *known;
+  // The segment that begins last before the tick says which of its frames is shown.
+  RELIT_TRY(load_index());
+  if (index_) {
+    const container::IndexRecord::Entry* entry = nullptr;
+    for (const auto& e : index_->segments) {
+      if (e.clip_id == clip_.id && e.first_tick <= tick) entry = &e;
+    }
+    if (entry != nullptr) {
+      const std::uint64_t first = entry->first_frame;
+      RELIT_ASSIGN(const bool jumped, jump(first));
+      if (jumped) RELIT_TRY(read_until(first));
+    }
+  }
+  for (;;) {
+    if (const auto known = timeline_.frame_at(tick)) return *known;
+    const std::uint64_t before = complete_end_;
+    RELIT_TRY(read_until(complete_end_));
+    if (ended_ || complete_end_ == before) break;
+  }
+  return fail(ErrorCode::kNotFound, name_ + ": the segment of tick " + std::to_string(tick) +
+                                        " of clip \"" + clip_.name + "\" is missing");
+}
+
+std::uint64_t ClipReader::first_tick(std::uint64_t index) const {
+  return timeline_.first_tick(index).value_or(index);
+}
+
+std::uint32_t ClipReader::ticks_of(std::uint64_t index) const {
+  return timeline_.ticks_of(index).value_or(1);
 }
 
 void ClipReader::forget_before(std::uint64_t index) {

@@ -10,6 +10,7 @@
 #include "container/base/result.hpp"
 #include "container/byte_source.hpp"
 #include "container/reader.hpp"
+#include "container/timeline.hpp"
 #include "decoders/mesh.hpp"
 #include "decoders/plane_decoder.hpp"
 #include "decoders/pose.hpp"
@@ -59,12 +60,20 @@ class ClipReader {
   /// counts.
   Status frame(std::uint64_t index, ClipFrame& out);
 
+  /// The frame shown at `tick` of the clip. Where frames are unevenly spaced this may read ahead,
+  /// or seek. Errors: kNotFound beyond the clip or what can be read of it; kIo, kCancelled.
+  Result<std::uint64_t> frame_at(std::uint64_t tick);
+  /// When a frame that frame() has given begins, and how many ticks it is shown.
+  [[nodiscard]] std::uint64_t first_tick(std::uint64_t index) const;
+  [[nodiscard]] std::uint32_t ticks_of(std::uint64_t index) const;
+
  private:
   ClipReader(container::Reader reader, std::string name)
       : reader_(std::move(reader)), name_(std::move(name)) {}
 
   Status choose_clip(const std::string& wanted);
   Status read_until(std::uint64_t index);
+  Status load_index();
   Result<bool> jump(std::uint64_t index);
   Status take(container::Record record);
   Status note_damage(const Error& error);
@@ -82,6 +91,7 @@ class ClipReader {
   std::optional<decoders::PoseTrack> poses_;
   std::optional<decoders::PlaneDecoder> planes_;
   std::vector<std::uint32_t> tracks_;  ///< wanted, sorted
+  container::Timeline timeline_;
   std::optional<container::IndexRecord> index_;
   std::vector<container::IndexRecord::Entry> seen_;  ///< segments of the clip that went by
   std::optional<container::SegmentRecord> segment_;  ///< whose chunks are coming in

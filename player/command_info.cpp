@@ -67,11 +67,6 @@ const char* chroma_name(container::Chroma chroma) {
   return "?";
 }
 
-double duration_s(const container::ClipRecord& clip) {
-  return static_cast<double>(clip.frame_count) * static_cast<double>(clip.frame_rate.den) /
-         static_cast<double>(clip.frame_rate.num);
-}
-
 std::uint64_t bytes_of(const Survey& s, std::uint32_t track) {
   const auto found = s.track_bytes.find(track);
   return found == s.track_bytes.end() ? 0 : found->second;
@@ -83,8 +78,9 @@ ordered_json clips_json(const Survey& s) {
     clips.push_back({{"id", clip.id},
                      {"name", clip.name},
                      {"frames", clip.frame_count},
-                     {"fps", {clip.frame_rate.num, clip.frame_rate.den}},
-                     {"duration_s", duration_s(clip)},
+                     {"tick_rate", {clip.tick_rate.num, clip.tick_rate.den}},
+                     {"duration_ticks", clip.duration_ticks},
+                     {"duration_s", container::duration_s(clip)},
                      {"loop", clip.loop},
                      {"bounds", {clip.bounds_min, clip.bounds_max}}});
   }
@@ -188,8 +184,8 @@ void print(const Survey& s, const std::string& name) {
   for (const auto& clip : s.contents.clips) {
     std::printf("  clip %u \"%s\": %llu frames, %.4g frames/s, %.3f s%s\n", clip.id,
                 clip.name.c_str(), static_cast<unsigned long long>(clip.frame_count),
-                static_cast<double>(clip.frame_rate.num) / static_cast<double>(clip.frame_rate.den),
-                duration_s(clip), clip.loop ? ", loops" : "");
+                static_cast<double>(clip.tick_rate.num) / static_cast<double>(clip.tick_rate.den),
+                container::duration_s(clip), clip.loop ? ", loops" : "");
   }
   std::size_t vertices = 0, triangles = 0, image_bytes = 0;
   for (const auto& mesh : s.contents.meshes)

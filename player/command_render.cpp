@@ -40,24 +40,24 @@ Result<Size> parse_size(const std::string& text, const char* option, int largest
                                        std::to_string(largest) + " each");
 }
 
-Result<FrameRange> chosen_frames(const Arguments& arguments, const container::ClipRecord& clip) {
+Result<FrameRange> chosen_frames(const Arguments& arguments, ClipReader& reader) {
+  const container::ClipRecord& clip = reader.clip();
   if (!arguments.frames.empty())
     return parse_frames(arguments.frames, "--frames", clip.frame_count);
   if (!arguments.frame.empty()) return parse_frames(arguments.frame, "--frame", clip.frame_count);
   FrameRange range;
   if (arguments.time_s >= 0) {
-    const double at = arguments.time_s * static_cast<double>(clip.frame_rate.num) /
-                      static_cast<double>(clip.frame_rate.den);
-    // A time that names a frame to within rounding means that frame.
-    if (at < static_cast<double>(clip.frame_count)) {
-      range.first = range.last = static_cast<std::uint64_t>(at + 1e-6);
-      return range;
+    const double at = arguments.time_s * static_cast<double>(clip.tick_rate.num) /
+                      static_cast<double>(clip.tick_rate.den);
+    if (at >= static_cast<double>(clip.duration_ticks)) {
+      return fail(ErrorCode::kNotFound,
+                  "--time: the clip lasts " + std::to_string(container::duration_s(clip)) + " s");
     }
-    return fail(ErrorCode::kNotFound, "--time: the clip lasts " +
-                                          std::to_string(static_cast<double>(clip.frame_count) *
-                                                         static_cast<double>(clip.frame_rate.den) /
-                                                         static_cast<double>(clip.frame_rate.num)) +
-                                          " s");
+    // A time that names a tick to within rounding means that tick.
+    const auto tick = std::min(static_cast<std::uint64_t>(at + 1e-6), clip.duration_ticks - 1);
+    RELIT_ASSIGN(range.first, reader.frame_at(tick));
+    range.last = range.first;
+    return range;
   }
   const std::string extension = std::filesystem::path(arguments.output).extension().string();
   const bool film = extension == ".mp4" || extension == ".webp" || extension == ".gif" ||
@@ -75,7 +75,7 @@ Status render_lightmap(const Arguments& arguments, ClipReader& clip, const Loade
   RELIT_ASSIGN(auto relighter, Relighter::create(clip.model(), clip.layers(), gl.device.get(),
                                                  backend != Backend::kCpu));
   RELIT_TRY(relighter->set_light(light.light, decoded_layers(clip, arguments.layers)));
-  RELIT_ASSIGN(const FrameRange range, chosen_frames(arguments, clip.clip()));
+  RELIT_ASSIGN(const FrameRange range, chosen_frames(arguments, clip));
   std::vector<std::uint64_t> shape{3, clip.model().height, clip.model().width};
   if (!range.single) shape.insert(shape.begin(), range.last - range.first + 1);
   RELIT_ASSIGN(
@@ -172,13 +172,13 @@ Status render_sheet(const Arguments& arguments, ClipReader& clip, PictureRendere
 Status render_pictures(const Arguments& arguments, ClipReader& clip, const LoadedLight& light,
                        Backend backend) {
   RELIT_ASSIGN(const Size size, parse_size(arguments.size, "--size", 8192));
-  RELIT_ASSIGN(const FrameRange range, chosen_frames(arguments, clip.clip()));
+  RELIT_ASSIGN(const FrameRange range, chosen_frames(arguments, clip));
   RELIT_ASSIGN(auto renderer, PictureRenderer::create(arguments, clip, light, backend, size));
   if (!arguments.sheet.empty()) return render_sheet(arguments, clip, *renderer, range, size);
   PictureWriter::Options options;
   options.path = arguments.output;
   options.width = size.width, options.height = size.height;
-  options.frame_rate = clip.clip().frame_rate;
+  options.tick_rate = clip.clip().tick_rate;
   options.pictures = range.last - range.first + 1;
   RELIT_ASSIGN(auto writer, PictureWriter::create(options));
   std::vector<std::uint8_t> picture(std::size_t{4} * static_cast<std::size_t>(size.width) *
@@ -187,7 +187,7 @@ Status render_pictures(const Arguments& arguments, ClipReader& clip, const Loade
   for (std::uint64_t k = range.first; k <= range.last; ++k) {
     RELIT_TRY(clip.frame(k, frame));
     RELIT_TRY(renderer->draw(frame, picture));
-    RELIT_TRY(writer->add(picture));
+    RELIT_TRY(writer->add(picture, clip.ticks_of(k)));
   }
   return writer->finish();
 }

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstring>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -86,8 +87,7 @@ Status Encoder::open(const Format& format, const PictureWriter::Options& options
   c.width = options.width;
   c.height = options.height;
   c.pix_fmt = format.pixels;
-  c.time_base = {static_cast<int>(options.frame_rate.den),
-                 static_cast<int>(options.frame_rate.num)};
+  c.time_base = {static_cast<int>(options.tick_rate.den), static_cast<int>(options.tick_rate.num)};
   c.framerate = av_inv_q(c.time_base);
   c.thread_count = 1;
   if (global_header) c.flags |= AV_CODEC_FLAG_GLOBAL_HEADER;
@@ -171,7 +171,7 @@ class StillWriter final : public PictureWriter {
     return probe.open(format, options, false);
   }
 
-  Status add(std::span<const std::uint8_t> rgba) override {
+  Status add(std::span<const std::uint8_t> rgba, std::uint32_t /*ticks*/) override {
     RELIT_TRY(check_size(options_, rgba));
     // FFmpeg's still encoders take one picture each.
     Encoder encoder;
@@ -258,10 +258,12 @@ class MovieWriter final : public PictureWriter {
     return {};
   }
 
-  Status add(std::span<const std::uint8_t> rgba) override {
+  Status add(std::span<const std::uint8_t> rgba, std::uint32_t ticks) override {
     RELIT_TRY(check_size(options_, rgba));
     RELIT_ASSIGN(AVFrame * frame, encoder_.convert(rgba));
-    frame->pts = next_pts_++;
+    frame->pts = next_pts_;
+    ticks_[next_pts_] = ticks;
+    next_pts_ += ticks;
     return encode(frame);
   }
 
@@ -290,7 +292,9 @@ class MovieWriter final : public PictureWriter {
       return fail(ErrorCode::kEnvironment, where + ": cannot encode: " + ffmpeg::reason(code));
     AVPacket* packet = encoder_.packet();
     while ((code = avcodec_receive_packet(encoder_.context(), packet)) >= 0) {
-      packet->duration = 1;
+      const auto shown = ticks_.find(packet->pts);
+      packet->duration = shown == ticks_.end() ? 1 : shown->second;
+      if (shown != ticks_.end()) ticks_.erase(shown);
       av_packet_rescale_ts(packet, encoder_.context()->time_base, stream_->time_base);
       packet->stream_index = stream_->index;
       if (const int written = av_interleaved_write_frame(muxer_, packet); written < 0) {
@@ -309,6 +313,7 @@ class MovieWriter final : public PictureWriter {
   AVStream* stream_ = nullptr;
   std::filesystem::path part_;
   std::int64_t next_pts_ = 0;
+  std::map<std::int64_t, std::int64_t> ticks_;  // of the pictures inside the encoder, by pts
 };
 
 template <class Writer>

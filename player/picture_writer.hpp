@@ -23,8 +23,8 @@ class PictureWriter {
     std::filesystem::path path;
     int width = 0;  ///< pixels; .mp4 needs even numbers
     int height = 0;
-    container::Rational frame_rate{25, 1};  ///< pictures per second; GIF rounds to 1/100 s
-    std::uint64_t pictures = 1;             ///< that will be added
+    container::Rational tick_rate{25, 1};  ///< per second; GIF rounds to 1/100 s
+    std::uint64_t pictures = 1;            ///< that will be added
   };
 
   /// Errors: kInvalid (extension, size, several pictures for one .png), kEnvironment (FFmpeg
@@ -32,9 +32,9 @@ class PictureWriter {
   static Result<std::unique_ptr<PictureWriter>> create(const Options& options);
   virtual ~PictureWriter() = default;
 
-  /// The next picture: RGBA, 8 bits, sRGB, rows from the top, width × height × 4 bytes. Alpha is
-  /// ignored.
-  virtual Status add(std::span<const std::uint8_t> rgba) = 0;
+  /// The next picture, shown for so many ticks: RGBA, 8 bits, sRGB, rows from the top, width ×
+  /// height × 4 bytes. Alpha is ignored.
+  virtual Status add(std::span<const std::uint8_t> rgba, std::uint32_t ticks = 1) = 0;
   virtual Status finish() = 0;
 };
 

@@ -73,9 +73,9 @@ class Window {
   Status screenshot();
   void update_title();
 
-  [[nodiscard]] double fps() const {
-    return static_cast<double>(clip_.clip().frame_rate.num) /
-           static_cast<double>(clip_.clip().frame_rate.den);
+  [[nodiscard]] double ticks_per_s() const {
+    return static_cast<double>(clip_.clip().tick_rate.num) /
+           static_cast<double>(clip_.clip().tick_rate.den);
   }
 
   ClipReader& clip_;
@@ -91,7 +91,7 @@ class Window {
   ClipFrame frame_;
 
   Clock::time_point last_tick_;
-  double position_ = 0;  // in frames
+  double position_ = 0;  // in ticks
   std::uint64_t shown_frame_ = ~std::uint64_t{0};
   std::size_t light_ = 0;
   double light_turn_rad_ = 0;
@@ -236,10 +236,12 @@ void Window::handle_motion(const SDL_MouseMotionEvent& motion) {
   redraw_ = true;
 }
 
+// To the frame before or behind the one that is shown, around the ends.
 void Window::step(int frames) {
   paused_ = true;
-  const auto count = static_cast<double>(clip_.clip().frame_count);
-  position_ = std::fmod(std::floor(position_) + frames + count, count);
+  const std::uint64_t count = clip_.clip().duration_ticks, start = clip_.first_tick(shown_frame_);
+  position_ = static_cast<double>(
+      (frames > 0 ? start + clip_.ticks_of(shown_frame_) : start + count - 1) % count);
 }
 
 void Window::advance_clock() {
@@ -247,14 +249,14 @@ void Window::advance_clock() {
   const double elapsed_s = std::chrono::duration<double>(now - last_tick_).count();
   last_tick_ = now;
   if (paused_) return;
-  const auto count = static_cast<double>(clip_.clip().frame_count);
-  position_ += elapsed_s * fps();
+  const auto count = static_cast<double>(clip_.clip().duration_ticks);
+  position_ += elapsed_s * ticks_per_s();
   position_ = clip_.clip().loop ? std::fmod(position_, count) : std::min(position_, count - 1);
 }
 
 // Brings the scene up to the frame and the light of the moment.
 Status Window::update() {
-  const auto wanted = static_cast<std::uint64_t>(position_);
+  RELIT_ASSIGN(const std::uint64_t wanted, clip_.frame_at(static_cast<std::uint64_t>(position_)));
   const bool new_frame = wanted != shown_frame_;
   if (!new_frame && !light_changed_ && !light_turned_) return {};
   if (light_changed_) RELIT_TRY(scene_->set_light(lights_[light_]));

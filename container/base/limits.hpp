@@ -36,9 +36,14 @@ inline constexpr std::uint32_t kPalette = 65535;       ///< (node, inverse bind 
 inline constexpr std::uint32_t kMorphWeights = 65535;  ///< of one skeleton
 inline constexpr std::uint32_t kPoseChannels = 3 * kNodes + kMorphWeights;
 inline constexpr std::uint64_t kFrames = 1ull << 32;  ///< of one clip
+inline constexpr std::uint64_t kTicks = 1ull << 32;   ///< of one clip: times the tick rate < 2^63
 inline constexpr std::uint32_t kFramesPerSegment = 65536;
 inline constexpr std::uint32_t kChunksPerSegment = 1024;
 inline constexpr std::uint32_t kPacketsPerChunk = 2 * kFramesPerSegment;
+inline constexpr std::uint64_t kVideoSamples = 1ull << 48;  ///< of all coded pictures of a clip
+inline constexpr std::uint64_t kVideoSamplesPerSecond = 1ull << 33;
+inline constexpr std::uint32_t kDecoderPictures =
+    32;  ///< references, reordering, the one coming out
 inline constexpr std::uint32_t kSegments = 1u << 24;
 
 }  // namespace relit::limits

@@ -76,20 +76,21 @@ TEST_CASE("every record survives serialisation, and no other length of it does")
   check_codec(sample::model(), parse_model);
   check_codec(sample::layer(), parse_layer);
   check_codec(sample::second_layer(), parse_layer);
-  check_codec(SegmentRecord{3, 7, 100, 25, {{1, 32}, {9, 1024}}}, parse_segment);
-  check_codec(IndexRecord{{{0, 7, 0, 25, 1000}, {2, 8, 25, 25, 2000}}}, parse_index);
-  check_codec(EndRecord{64, 1024}, parse_end);
+  check_codec(SegmentRecord{3, 7, 100, 25, {{1, 32}, {9, 1024}}, 90, {}}, parse_segment);
+  check_codec(SegmentRecord{3, 7, 100, 3, {{1, 32}}, 5000, {1, 40, 0xFFFF}}, parse_segment);
+  check_codec(IndexRecord{{{0, 7, 0, 25, 1000, 0}, {2, 8, 25, 25, 2000, 31}}}, parse_index);
+  check_codec(EndRecord{64, 1024, 128}, parse_end);
   check_chunk_codec(sample::chunk(5, 100, 4));
 }
 
 TEST_CASE("records survive with extreme values") {
   check_codec(HeaderRecord{0, 0xFFFF, std::string(limits::kStringBytes, 'x')}, parse_header);
   ClipRecord clip = sample::clip(0xFFFFFFFF, limits::kFrames);
-  clip.frame_rate = {0x7FFFFFFF, 1};
+  clip.tick_rate = {0x7FFFFFFF, 1};
   clip.bounds_min = {-kHuge, -0.0f, kTiny};
   clip.bounds_max = {kHuge, 0, kTiny};
   check_codec(clip, parse_clip);
-  clip.frame_rate = {1, 0x7FFFFFFF};
+  clip.tick_rate = {1, 0x7FFFFFFF};
   clip.name = "";
   check_codec(clip, parse_clip);
   check_codec(MaterialRecord{}, parse_material);
@@ -165,10 +166,10 @@ TEST_CASE("headers of newer major versions are refused, newer minor ones are rea
 
 TEST_CASE("clips, images and materials that make no sense are refused") {
   const auto clip = sample::clip();
-  REFUSED(kCorrupt, clip, r.frame_rate.num = 0);
-  REFUSED(kCorrupt, clip, r.frame_rate.den = 0);
-  REFUSED(kCorrupt, clip, r.frame_rate.num = -1);
-  REFUSED(kCorrupt, clip, r.frame_rate.num = 0x80000000);
+  REFUSED(kCorrupt, clip, r.tick_rate.num = 0);
+  REFUSED(kCorrupt, clip, r.tick_rate.den = 0);
+  REFUSED(kCorrupt, clip, r.tick_rate.num = -1);
+  REFUSED(kCorrupt, clip, r.tick_rate.num = 0x80000000);
   REFUSED(kCorrupt, clip, r.frame_count = 0);
   REFUSED(kLimit, clip, r.frame_count = limits::kFrames + 1);
   REFUSED(kCorrupt, clip, r.bounds_min[1] = kNan);
@@ -283,7 +284,7 @@ TEST_CASE("models and layers that make no sense are refused") {
 }
 
 TEST_CASE("segments, chunks and indices that make no sense are refused") {
-  const SegmentRecord segment{3, 7, 100, 25, {{1, 32}, {9, 1024}}};
+  const SegmentRecord segment{3, 7, 100, 25, {{1, 32}, {9, 1024}}, 90, {}};
   REFUSED(kCorrupt, segment, r.index = limits::kSegments);
   REFUSED(kCorrupt, segment, r.frame_count = 0);
   REFUSED(kLimit, segment, r.frame_count = limits::kFramesPerSegment + 1);

@@ -17,7 +17,7 @@ void must(const Status& status) {
 }  // namespace
 
 ClipRecord clip(std::uint32_t id, std::uint64_t frames) {
-  return {id, "walk äö", {30000, 1001}, frames, true, {-1, 0, -2.5f}, {1, 1.75f, 2}};
+  return {id, "walk äö", {30000, 1001}, frames, true, {-1, 0, -2.5f}, {1, 1.75f, 2}, frames};
 }
 
 ImageRecord image() { return {3, "image/png", {0x89, 'P', 'N', 'G', 1, 2, 3}}; }

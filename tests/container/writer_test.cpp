@@ -88,7 +88,7 @@ TEST_CASE("the writer keeps the order of the records") {
 TEST_CASE("the writer refuses records that no reader would take") {
   Fixture f;
   auto clip = sample::clip();
-  clip.frame_rate.den = 0;
+  clip.tick_rate.den = 0;
   const auto bad = f.writer.add(clip);
   REQUIRE_FALSE(bad);
   CHECK(bad.error().code == ErrorCode::kInvalid);

@@ -44,8 +44,8 @@ TEST_CASE("the shipped clip is complete, small and loops") {
   REQUIRE(clip);
   CHECK(clip->clip().loop);
   CHECK(static_cast<double>(clip->clip().frame_count) *
-            static_cast<double>(clip->clip().frame_rate.den) >=
-        2.0 * static_cast<double>(clip->clip().frame_rate.num));
+            static_cast<double>(clip->clip().tick_rate.den) >=
+        2.0 * static_cast<double>(clip->clip().tick_rate.num));
   ClipFrame frame;
   for (std::uint64_t k = 0; k < clip->clip().frame_count; ++k) {
     REQUIRE(clip->frame(k, frame));

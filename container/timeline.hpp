@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "container/records.hpp"
+
+namespace relit::container {
+
+/// When the frames of a clip are shown (FORMAT.md, section 3.1), as far as its segments are known.
+/// An evenly spaced clip needs none of them.
+class Timeline {
+ public:
+  Timeline() = default;
+  explicit Timeline(const ClipRecord& clip)
+      : even_(clip.duration_ticks == clip.frame_count), duration_(clip.duration_ticks) {}
+
+  /// What a segment of the clip says. A segment that starts at the same tick is replaced.
+  void add(const SegmentRecord& segment);
+
+  /// The frame shown at `tick`; nothing where its segment is not known.
+  [[nodiscard]] std::optional<std::uint64_t> frame_at(std::uint64_t tick) const;
+  /// When `frame` begins to be shown.
+  [[nodiscard]] std::optional<std::uint64_t> first_tick(std::uint64_t frame) const;
+  /// How long `frame` is shown: at least one tick.
+  [[nodiscard]] std::optional<std::uint32_t> ticks_of(std::uint64_t frame) const;
+
+  [[nodiscard]] bool even() const { return even_; }
+  [[nodiscard]] std::uint64_t duration_ticks() const { return duration_; }
+
+ private:
+  struct Run {
+    std::uint64_t first_frame = 0;
+    std::vector<std::uint64_t> starts;  ///< ticks of each frame, and where the last one ends
+  };
+  [[nodiscard]] const Run* run_of(std::uint64_t frame) const;
+
+  bool even_ = true;
+  std::uint64_t duration_ = 0;
+  std::map<std::uint64_t, Run> runs_;  ///< by first tick
+};
+
+}  // namespace relit::container
