@@ -126,25 +126,31 @@ Result<std::span<const std::uint8_t>> RecordInput::payload() {
   header_.reset();
   const auto size = static_cast<std::size_t>(header.payload_bytes);
   const std::size_t total = size + padding_after(size);
-  if (payload_.capacity() > kKeptBytes) payload_ = {};
-  payload_.clear();
-
+  if (payload_.size() > kKeptBytes) payload_ = {};
+  std::size_t done = 0;
   const auto suspect = [&] {
     suspect_.assign(header_bytes_.begin(), header_bytes_.end());
-    suspect_.insert(suspect_.end(), payload_.begin(), payload_.end());
+    suspect_.insert(suspect_.end(), payload_.begin(),
+                    payload_.begin() + static_cast<std::ptrdiff_t>(done));
   };
-  while (payload_.size() < total) {
-    const std::size_t done = payload_.size();
-    payload_.resize(std::min(total, std::max(kFirstReadBytes, 2 * done)));
-    auto got = read_fully(std::span(payload_).subspan(done));
+  // A length is believed where the source can hold it; else memory follows what arrives.
+  const auto source_bytes = source_->size();
+  const bool believed =
+      source_bytes && total <= *source_bytes - std::min(*source_bytes, offset_bytes());
+  while (done < total) {
+    const std::size_t goal =
+        believed ? total : std::min(total, std::max(kFirstReadBytes, 2 * done));
+    // Only growth is paid for: what a longer record left behind is overwritten.
+    if (payload_.size() < goal) payload_.resize(goal);
+    auto got = read_fully(std::span(payload_).subspan(done, goal - done));
     // How much arrived before the source failed is unknown, so there is nothing to search later.
     if (!got) return lose(std::move(got).error());
-    if (done + *got == payload_.size()) continue;
-    payload_.resize(done + *got);
+    done += *got;
+    if (done == goal) continue;
     suspect();
-    return lose(truncated(total, payload_.size()));
+    return lose(truncated(total, done));
   }
-  const auto bytes = std::span<const std::uint8_t>(payload_);
+  const auto bytes = std::span<const std::uint8_t>(payload_).first(total);
   const bool padded = std::ranges::all_of(bytes.subspan(size), [](auto b) { return b == 0; });
   if (verify_ && (!padded || crc32(bytes.first(size)) != header.payload_crc)) {
     suspect();
