@@ -58,8 +58,8 @@ Status Writer::add(const LayerRecord& record) { return add_static(types::kLayer,
 Status Writer::add_ancillary(RecordType type, std::span<const std::uint8_t> payload) {
   const auto write = [&]() -> Status {
     if (closed_) return enter(order_);
-    RELIT_TRY(require(is_well_formed(type) && !is_critical(type),
-                      "'" + type_name(type) + "' is not the type of an ancillary record"));
+    RELIT_REQUIRE(is_well_formed(type) && !is_critical(type),
+                  "'" + type_name(type) + "' is not the type of an ancillary record");
     return write_record(type, payload);
   };
   return settle(write(), "ancillary record");
@@ -68,23 +68,22 @@ Status Writer::add_ancillary(RecordType type, std::span<const std::uint8_t> payl
 Status Writer::check_segment(const SegmentInfo& info,
                              const std::vector<ChunkRecord>& chunks) const {
   const auto frame_count = references_.frame_count(info.clip_id);
-  RELIT_TRY(
-      require(frame_count.has_value(), "clip " + std::to_string(info.clip_id) + " does not exist"));
+  RELIT_REQUIRE(frame_count.has_value(),
+                "clip " + std::to_string(info.clip_id) + " does not exist");
   const auto done = written_.find(info.clip_id);
   const std::uint64_t expected = done == written_.end() ? 0 : done->second.frames;
-  RELIT_TRY(require(info.first_frame == expected,
-                    "the segment starts with frame " + std::to_string(info.first_frame) +
-                        ", the next one of its clip is " + std::to_string(expected)));
-  RELIT_TRY(
-      require(info.frame_count <= *frame_count - expected,
-              "the segment goes beyond the clip's " + std::to_string(*frame_count) + " frames"));
+  RELIT_REQUIRE(info.first_frame == expected,
+                "the segment starts with frame " + std::to_string(info.first_frame) +
+                    ", the next one of its clip is " + std::to_string(expected));
+  RELIT_REQUIRE(info.frame_count <= *frame_count - expected,
+                "the segment goes beyond the clip's " + std::to_string(*frame_count) + " frames");
   const auto tracks = references_.tracks(info.clip_id);
   for (const ChunkRecord& chunk : chunks)
-    RELIT_TRY(require(std::ranges::find(tracks, chunk.track_id) != tracks.end(),
-                      "track " + std::to_string(chunk.track_id) + " is not one of the clip's"));
+    RELIT_REQUIRE(std::ranges::find(tracks, chunk.track_id) != tracks.end(),
+                  "track " + std::to_string(chunk.track_id) + " is not one of the clip's");
   for (const std::uint32_t track : tracks)
-    RELIT_TRY(require(std::ranges::count(chunks, track, &ChunkRecord::track_id) == 1,
-                      "the segment needs exactly one chunk for track " + std::to_string(track)));
+    RELIT_REQUIRE(std::ranges::count(chunks, track, &ChunkRecord::track_id) == 1,
+                  "the segment needs exactly one chunk for track " + std::to_string(track));
   return {};
 }
 
@@ -156,14 +155,14 @@ Status Writer::check_complete() const {
     if (references_.tracks(clip).empty()) continue;
     const auto done = written_.find(clip);
     const Written written = done == written_.end() ? Written{} : done->second;
-    RELIT_TRY(require(written.frames == references_.frame_count(clip),
-                      "clip " + std::to_string(clip) + " has segments for " +
-                          std::to_string(written.frames) + " of its " +
-                          std::to_string(*references_.frame_count(clip)) + " frames"));
-    RELIT_TRY(require(written.ticks == references_.duration_ticks(clip),
-                      "the frames of clip " + std::to_string(clip) + " last " +
-                          std::to_string(written.ticks) + " of its " +
-                          std::to_string(*references_.duration_ticks(clip)) + " ticks"));
+    RELIT_REQUIRE(written.frames == references_.frame_count(clip),
+                  "clip " + std::to_string(clip) + " has segments for " +
+                      std::to_string(written.frames) + " of its " +
+                      std::to_string(*references_.frame_count(clip)) + " frames");
+    RELIT_REQUIRE(written.ticks == references_.duration_ticks(clip),
+                  "the frames of clip " + std::to_string(clip) + " last " +
+                      std::to_string(written.ticks) + " of its " +
+                      std::to_string(*references_.duration_ticks(clip)) + " ticks");
   }
   return {};
 }
@@ -186,10 +185,9 @@ Status Writer::write_bytes(std::span<const std::uint8_t> bytes) {
 Status Writer::enter(int order) {
   if (closed_) return fail(ErrorCode::kInvalid, "the writer is finished, or failed before");
   const bool once = order == order_of(types::kSkeleton) && order_ == order;
-  RELIT_TRY(
-      require(order >= order_ && !once, once ? "a file has one skeleton"
-                                             : "this record comes too late: the order is "
-                                               "CLIP IMAG MATL MESH SKEL POSE MODL LAYR SEGM"));
+  RELIT_REQUIRE(order >= order_ && !once, once ? "a file has one skeleton"
+                                               : "this record comes too late: the order is "
+                                                 "CLIP IMAG MATL MESH SKEL POSE MODL LAYR SEGM");
   order_ = order;
   return {};
 }
