@@ -164,12 +164,14 @@ Result<std::span<const std::uint8_t>> RecordInput::payload() {
     return lose(truncated(total, payload_.size()));
   }
   const auto bytes = std::span<const std::uint8_t>(payload_);
+  if (!verify_) return bytes.first(size);
+  const bool intact = crc32(bytes.first(size)) == header.payload_crc;
   const bool padded = std::ranges::all_of(bytes.subspan(size), [](auto b) { return b == 0; });
-  if (verify_ && (!padded || crc32(bytes.first(size)) != header.payload_crc)) {
+  if (!intact || !padded) {
     suspect();
-    damage_ = padded ? FramingDamage::kPayloadChecksum : FramingDamage::kPadding;
+    damage_ = intact ? FramingDamage::kPadding : FramingDamage::kPayloadChecksum;
     return fail(ErrorCode::kCorrupt,
-                padded ? "the payload does not match its checksum" : "the padding is not zero");
+                intact ? "the padding is not zero" : "the payload does not match its checksum");
   }
   return bytes.first(size);
 }

@@ -68,7 +68,7 @@ class Walk {
  private:
   Result<bool> read_signature();
   Result<bool> step();
-  Result<bool> lose_framing(const Error& error);
+  Result<bool> lose_framing(const Error& error, std::uint64_t offset);
   Result<bool> resume_at_end(std::uint64_t lost_at);
   Status take(const RecordHeader& header);
   bool check_flags(const FindingPlace& place, const RecordHeader& header);
@@ -126,28 +126,29 @@ Result<bool> Walk::read_signature() {
 }
 
 Result<bool> Walk::step() {
+  const std::uint64_t offset = input_.offset_bytes();
   const auto header = input_.peek();
   if (header && !*header) return false;
   if (finished_) {
-    log_.add("ORDER_BEHIND_END", {input_.offset_bytes()}, "there is something behind FEND");
+    log_.add("ORDER_BEHIND_END", {offset}, "there is something behind FEND");
     return false;
   }
-  if (!header) return lose_framing(header.error());
+  if (!header) return lose_framing(header.error(), offset);
   const Status taken = take(**header);
   if (taken) return !give_up_;
-  return lose_framing(taken.error());
+  return lose_framing(taken.error(), offset);
 }
 
 /// Says what was lost, and finds the next record behind it; false: there is none.
-Result<bool> Walk::lose_framing(const Error& error) {
-  if (input_.damage() == FramingDamage::kSource) return Unexpected{error};
-  const FindingPlace place{input_.offset_bytes()};
-  const FindingId id = finding_of(input_.damage());
-  if (segments_.inside() || order_ >= kSegmentOrder) segments_.abandon();
+Result<bool> Walk::lose_framing(const Error& error, std::uint64_t offset) {
+  const FramingDamage damage = input_.damage();
+  if (damage == FramingDamage::kSource) return Unexpected{error};
+  const FindingPlace place{offset};
+  segments_.abandon();
   if (order_ < kSegmentOrder) statics_.note_loss();
   RELIT_ASSIGN(const bool found, input_.resync());
   const std::uint64_t resumed = input_.offset_bytes();
-  log_.add(id, place,
+  log_.add(finding_of(damage), place,
            error.message + (found ? "; the next segment is at byte " + std::to_string(resumed)
                                   : "; no segment follows"));
   segments_.note_loss(place.offset_bytes, resumed);
@@ -157,6 +158,8 @@ Result<bool> Walk::lose_framing(const Error& error) {
     order_ = kSegmentOrder;
     return true;
   }
+  // What was cut has no end; otherwise the damage may have hit it.
+  if (damage == FramingDamage::kTruncated) return false;
   return resume_at_end(place.offset_bytes);
 }
 
