@@ -149,6 +149,7 @@ Result<std::optional<RecordHeader>> Reader::peek_known() {
     if (segment_ || finished_) return *peeked;  // for check_place() to refuse
     if (copy && order < kSegmentOrder && order_ == kSegmentOrder && copies_offset_ == 0)
       copies_offset_ = offset;
+    if (options_.on_passed_over) options_.on_passed_over(header, offset);
     input_.skip();
   }
 }

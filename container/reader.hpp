@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -34,6 +35,9 @@ struct ReaderOptions {
   /// less.
   std::uint64_t max_record_bytes = limits::kRecordBytes;
   std::uint64_t max_static_bytes = limits::kStaticBytes;
+  /// Told of every intact header whose record next() passes over: copies and unknown ancillary
+  /// records, not chunks of unwanted tracks.
+  std::function<void(const RecordHeader& header, std::uint64_t offset_bytes)> on_passed_over = {};
 };
 
 /// What the reader could not give.

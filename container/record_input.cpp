@@ -25,6 +25,19 @@ Error truncated(std::uint64_t wanted, std::uint64_t got) {
           "the data end after " + std::to_string(got) + " of " + std::to_string(wanted) + " bytes"};
 }
 
+FramingDamage source_damage(const Error& error) {
+  return error.code == ErrorCode::kTruncated ? FramingDamage::kTruncated : FramingDamage::kSource;
+}
+
+/// Why decode_header() refused the bytes.
+FramingDamage header_damage(std::span<const std::uint8_t, kRecordHeaderBytes> bytes,
+                            const Error& error) {
+  if (error.code == ErrorCode::kLimit) return FramingDamage::kLength;
+  std::uint32_t stored = 0;
+  for (std::size_t i = 0; i < 4; ++i) stored |= std::uint32_t{bytes[20 + i]} << (8 * i);
+  return stored == crc32(bytes.first<20>()) ? FramingDamage::kType : FramingDamage::kHeaderChecksum;
+}
+
 }  // namespace
 
 Result<std::size_t> RecordInput::read_source(std::span<std::uint8_t> out) {
@@ -60,6 +73,7 @@ Status RecordInput::read_raw(std::span<std::uint8_t> out) {
 }
 
 Unexpected RecordInput::lose(Error error) {
+  damage_ = source_damage(error);
   lost_ = error;
   return Unexpected{std::move(error)};
 }
@@ -114,7 +128,12 @@ Result<std::optional<RecordHeader>> RecordInput::peek() {
   if (!header) {
     suspect_.insert(suspect_.end(), header_bytes_.begin(),
                     header_bytes_.begin() + static_cast<std::ptrdiff_t>(*got));
-    return lose(std::move(header).error());
+    const FramingDamage damage = *got < kRecordHeaderBytes
+                                     ? FramingDamage::kTruncated
+                                     : header_damage(header_bytes_, header.error());
+    auto failure = lose(std::move(header).error());
+    damage_ = damage;
+    return failure;
   }
   drop_suspect();
   header_ = *header;
@@ -151,11 +170,14 @@ Result<std::span<const std::uint8_t>> RecordInput::payload() {
     return lose(truncated(total, done));
   }
   const auto bytes = std::span<const std::uint8_t>(payload_).first(total);
+  if (!verify_) return bytes.first(size);
+  const bool intact = crc32(bytes.first(size)) == header.payload_crc;
   const bool padded = std::ranges::all_of(bytes.subspan(size), [](auto b) { return b == 0; });
-  if (verify_ && (!padded || crc32(bytes.first(size)) != header.payload_crc)) {
+  if (!intact || !padded) {
     suspect();
+    damage_ = intact ? FramingDamage::kPadding : FramingDamage::kPayloadChecksum;
     return fail(ErrorCode::kCorrupt,
-                padded ? "the payload does not match its checksum" : "the padding is not zero");
+                intact ? "the padding is not zero" : "the payload does not match its checksum");
   }
   return bytes.first(size);
 }

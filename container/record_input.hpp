@@ -13,6 +13,18 @@
 
 namespace relit::container {
 
+/// Why RecordInput could not give a header or a payload.
+enum class FramingDamage : std::uint8_t {
+  kNone,
+  kHeaderChecksum,
+  kType,    ///< the checksum is right, the type is none
+  kLength,  ///< beyond the limits
+  kPayloadChecksum,
+  kPadding,
+  kTruncated,
+  kSource,  ///< the source itself failed
+};
+
 /// Cuts a byte source into records: the part of the Reader that knows framing and checksums but no
 /// record. Keeps the bytes of a record that turned out damaged, so that resync() can look for a
 /// segment inside them even where the source cannot go back. One thread at a time.
@@ -39,6 +51,9 @@ class RecordInput {
   void skip();
   /// Passes over bytes at the next record's place; the source is moved only by the next peek().
   void skip_bytes(std::uint64_t bytes) { pending_skip_ += bytes; }
+
+  /// What the last error of peek() or payload() was about.
+  [[nodiscard]] FramingDamage damage() const { return damage_; }
 
   /// Declares the framing lost at the record that peek() gave.
   void lose_framing(Error error) { lost_ = std::move(error); }
@@ -82,6 +97,7 @@ class RecordInput {
   std::vector<std::uint8_t> payload_;
   std::vector<std::uint8_t> suspect_;  ///< what was read of the damaged record, up to here
   std::optional<Error> lost_;
+  FramingDamage damage_ = FramingDamage::kNone;
   std::uint64_t rewound_bytes_ = 0;
   std::uint64_t dropped_bytes_ = 0;
 };

@@ -61,5 +61,6 @@ Command add_dump(CLI::App& app);
 Command add_light(CLI::App& app);
 Command add_render(CLI::App& app);
 Command add_play(CLI::App& app);
+Command add_validate(CLI::App& app);
 
 }  // namespace relit::player
