@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -34,6 +35,9 @@ struct ReaderOptions {
   /// less.
   std::uint64_t max_record_bytes = limits::kRecordBytes;
   std::uint64_t max_static_bytes = limits::kStaticBytes;
+  /// Is given the ancillary records of unknown type that the reader passes over, as far as they are
+  /// intact; the payload is valid during the call.
+  std::function<void(RecordType, std::span<const std::uint8_t>)> on_unknown = {};
 };
 
 /// What the reader could not give.
@@ -113,6 +117,7 @@ class Reader {
   Result<std::optional<Record>> next_record();
   Result<std::optional<RecordHeader>> peek_known();
   void pass_unwanted_chunks();
+  void pass_unknown(const RecordHeader& header, std::uint64_t offset);
   Status check_place(const RecordHeader& header);
   Result<RecordBody> read_body(const RecordHeader& header);
   Result<RecordBody> accept(RecordBody body, std::uint64_t offset);

@@ -61,5 +61,8 @@ Command add_dump(CLI::App& app);
 Command add_light(CLI::App& app);
 Command add_render(CLI::App& app);
 Command add_play(CLI::App& app);
+Command add_recover(CLI::App& app);
+Command add_remux(CLI::App& app);
+Command add_concat(CLI::App& app);
 
 }  // namespace relit::player
