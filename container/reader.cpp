@@ -147,8 +147,7 @@ Result<std::optional<RecordHeader>> Reader::peek_known() {
       continue;
     }
     if (segment_ || finished_) return *peeked;  // for check_place() to refuse
-    if (copy && order < kSegmentOrder && order_ == kSegmentOrder && copies_offset_ == 0)
-      copies_offset_ = offset;
+    if (copy && order < kSegmentOrder && copies_offset_ == 0) copies_offset_ = offset;
     if (copy)
       input_.skip();
     else
@@ -277,6 +276,7 @@ Status Reader::accept_segment(const SegmentRecord& segment) {
   next_segment_index_ = segment.index + 1;
   segment_ = segment;
   chunk_ = 0;
+  copies_offset_ = 0;  // the end speaks of those behind the last segment
   return {};
 }
 

@@ -279,7 +279,12 @@ class SegmentRecovery {
 /// Clips of which no frame is left would only be names.
 Status drop_empty_clips(ByteSource& source, const Survey& found, StaticPart& part) {
   FileContents& contents = part.contents;
-  if (contents.pose_tracks.empty() && contents.layers.empty()) return {};
+  if (contents.pose_tracks.empty() && contents.layers.empty()) {
+    // Still meshes; or a file that was cut before it came to more.
+    const bool whole = found.finished || found.index || !found.copies.empty();
+    if (whole && !contents.meshes.empty()) return {};
+    return fail(ErrorCode::kCorrupt, "neither a segment nor a still mesh is left");
+  }
   RELIT_ASSIGN(RecordScan scan, RecordScan::create(source));
   SegmentRecovery trial(scan, found, contents, nullptr);
   RELIT_TRY(trial.run());

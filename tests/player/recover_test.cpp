@@ -343,6 +343,43 @@ TEST_CASE("recover finds records that have moved to odd places") {
   }
 }
 
+TEST_CASE("whatever happened to a file, what recover writes is whole") {
+  const Bytes file = shipped();
+  int written = 0;
+  for (std::uint32_t trial = 0; trial < 80; ++trial) {
+    INFO("trial " << trial);
+    std::mt19937 random(1000 + trial);
+    Bytes damaged = file;
+    for (std::uint32_t i = random() % 40; i > 0; --i) {
+      const std::uint64_t length = 1 + random() % (random() % 4 == 0 ? 20'000 : 200);
+      const std::uint64_t at = random() % (damaged.size() - length);
+      const auto begin = damaged.begin() + static_cast<std::ptrdiff_t>(at);
+      switch (random() % 4) {
+        case 0:
+          damaged.erase(begin, begin + static_cast<std::ptrdiff_t>(length));
+          break;
+        case 1:
+          damaged.insert(begin, length, static_cast<std::uint8_t>(random()));
+          break;
+        default:
+          damage(damaged, {at, at + length}, random);
+      }
+    }
+    const auto result = try_recover(damaged);
+    if (!result) {
+      CHECK(result.error().code == ErrorCode::kCorrupt);
+      continue;
+    }
+    ++written;
+    const Read after = read_all(result->bytes);
+    CHECK(after.finished);
+    CHECK(after.segments.size() == result->report.segments);
+    if (after.contents.models.empty()) continue;
+    check_decodes(result->bytes, after, 1 + after.contents.layers.size());
+  }
+  CHECK(written > 20);
+}
+
 TEST_CASE("recover ignores what is glued on behind the end") {
   const Bytes file = shipped();
   Bytes twice = file;
