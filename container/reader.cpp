@@ -147,11 +147,27 @@ Result<std::optional<RecordHeader>> Reader::peek_known() {
       continue;
     }
     if (segment_ || finished_) return *peeked;  // for check_place() to refuse
-    if (copy && order < kSegmentOrder && order_ == kSegmentOrder && copies_offset_ == 0)
-      copies_offset_ = offset;
+    if (copy && order < kSegmentOrder && copies_offset_ == 0) copies_offset_ = offset;
     if (options_.on_passed_over) options_.on_passed_over(header, offset);
-    input_.skip();
+    if (copy)
+      input_.skip();
+    else
+      pass_unknown(header, offset);
   }
+}
+
+void Reader::pass_unknown(const RecordHeader& header, std::uint64_t offset) {
+  const RecordType type = header.type;
+  const bool plain = (header.flags & flags::kCriticalMask) == 0;
+  if (!options_.on_unknown || !plain || header.payload_bytes > options_.max_record_bytes) {
+    input_.skip();
+    return;
+  }
+  const auto payload = input_.payload();
+  if (payload)
+    options_.on_unknown(type, *payload);
+  else if (!input_.framing_lost())
+    (void)damaged(payload.error(), type, offset);
 }
 
 Status Reader::check_place(const RecordHeader& header) {
@@ -261,6 +277,7 @@ Status Reader::accept_segment(const SegmentRecord& segment) {
   next_segment_index_ = segment.index + 1;
   segment_ = segment;
   chunk_ = 0;
+  copies_offset_ = 0;  // the end speaks of those behind the last segment
   return {};
 }
 

@@ -38,6 +38,9 @@ struct ReaderOptions {
   /// Told of every intact header whose record next() passes over: copies and unknown ancillary
   /// records, not chunks of unwanted tracks.
   std::function<void(const RecordHeader& header, std::uint64_t offset_bytes)> on_passed_over = {};
+  /// Is given the ancillary records of unknown type that the reader passes over, as far as they are
+  /// intact; the payload is valid during the call.
+  std::function<void(RecordType, std::span<const std::uint8_t>)> on_unknown = {};
 };
 
 /// What the reader could not give.
@@ -117,6 +120,7 @@ class Reader {
   Result<std::optional<Record>> next_record();
   Result<std::optional<RecordHeader>> peek_known();
   void pass_unwanted_chunks();
+  void pass_unknown(const RecordHeader& header, std::uint64_t offset);
   Status check_place(const RecordHeader& header);
   Result<RecordBody> read_body(const RecordHeader& header);
   Result<RecordBody> accept(RecordBody body, std::uint64_t offset);
@@ -141,7 +145,7 @@ class Reader {
   std::optional<std::vector<std::uint32_t>> wanted_;  ///< sorted
   std::uint64_t static_bytes_ = 0;
   std::uint64_t index_offset_ = 0;   ///< 0: not seen
-  std::uint64_t copies_offset_ = 0;  ///< of the first copy behind a segment; 0: not seen
+  std::uint64_t copies_offset_ = 0;  ///< of the first copy behind the last segment; 0: not seen
   bool jumped_ = false;              ///< by seek or resync: what was not seen may be there
   bool finished_ = false;
   std::optional<Error> fatal_;

@@ -62,5 +62,8 @@ Command add_light(CLI::App& app);
 Command add_render(CLI::App& app);
 Command add_play(CLI::App& app);
 Command add_validate(CLI::App& app);
+Command add_recover(CLI::App& app);
+Command add_remux(CLI::App& app);
+Command add_concat(CLI::App& app);
 
 }  // namespace relit::player
