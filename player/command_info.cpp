@@ -4,7 +4,6 @@
 #include <nlohmann/json.hpp>
 
 #include "player/command.hpp"
-#include "player/source.hpp"
 
 namespace relit::player {
 namespace {
@@ -12,7 +11,7 @@ namespace {
 using nlohmann::ordered_json;
 
 struct Arguments {
-  std::string source;
+  SourceArguments source;
   bool json = false;
 };
 
@@ -25,9 +24,12 @@ struct Survey {
   std::string damage;
 };
 
-Result<Survey> survey(const std::string& name) {
-  RELIT_ASSIGN(auto source, open_source(name));
-  auto reader = container::Reader::open(std::move(source));
+Result<Survey> survey(const SourceArguments& arguments) {
+  const std::string& name = arguments.name;
+  RELIT_ASSIGN(auto source, open_source(arguments, true));
+  container::ReaderOptions reading;
+  reading.sparing = true;
+  auto reader = container::Reader::open(std::move(source), reading);
   if (!reader) return fail(reader.error().code, name + ": " + reader.error().message);
   Survey found;
   auto contents = container::load_static(*reader);
@@ -217,10 +219,11 @@ int run(const Arguments& arguments) {
         "%s\n",
         to_json(*found).dump(2, ' ', false, ordered_json::error_handler_t::replace).c_str());
   } else {
-    print(*found, arguments.source);
+    print(*found, arguments.source.name);
   }
   if (found->damage.empty()) return kSuccess;
-  std::fprintf(stderr, "relit: %s: damaged: %s\n", arguments.source.c_str(), found->damage.c_str());
+  std::fprintf(stderr, "relit: %s: damaged: %s\n", arguments.source.name.c_str(),
+               found->damage.c_str());
   return kWithLosses;
 }
 
@@ -229,7 +232,7 @@ int run(const Arguments& arguments) {
 Command add_info(CLI::App& app) {
   CLI::App* command = app.add_subcommand("info", "say what a file holds");
   const auto arguments = std::make_shared<Arguments>();
-  command->add_option("source", arguments->source, "path, - or http(s)://")->required();
+  add_source_options(*command, arguments->source, "path, - or http(s)://");
   command->add_flag("--json", arguments->json, "as JSON, to standard output");
   return [arguments] { return run(*arguments); };
 }
