@@ -11,8 +11,6 @@ namespace {
 
 /// A header's length is believed only as far as bytes really come.
 constexpr std::size_t kFirstReadBytes = std::size_t{1} << 20;
-/// Below this, reading on is cheaper than seeking: over HTTP a seek is a new connection.
-constexpr std::uint64_t kLeastSeekBytes = std::uint64_t{1} << 16;
 constexpr std::size_t kScanBytes = std::size_t{1} << 16;
 /// How often, on the average, a byte may be gone over again.
 constexpr std::uint64_t kMostRewound = 8;

@@ -30,6 +30,9 @@ enum class FramingDamage : std::uint8_t {
 /// segment inside them even where the source cannot go back. One thread at a time.
 class RecordInput {
  public:
+  /// Fewer bytes than this are read through rather than sought over: over HTTP a seek is a request.
+  static constexpr std::uint64_t kLeastSeekBytes = 4096;
+
   /// `source` outlives the input and is moved by nobody else; it stands at `offset_bytes`.
   RecordInput(ByteSource& source, std::uint64_t offset_bytes, bool verify_checksums)
       : source_(&source), source_offset_(offset_bytes), verify_(verify_checksums) {}
@@ -66,6 +69,11 @@ class RecordInput {
 
   /// Goes to a record at `offset_bytes`. Errors: the source's.
   Status seek(std::uint64_t offset_bytes);
+
+  /// ByteSource::expect().
+  void expect(std::uint64_t begin_bytes, std::uint64_t end_bytes) {
+    source_->expect(begin_bytes, end_bytes);
+  }
 
   /// Where the next record starts, or the one that peek() gave.
   [[nodiscard]] std::uint64_t offset_bytes() const;

@@ -31,7 +31,7 @@ Status SegmentOrder::check(const SegmentRecord& segment) const {
                     can_last(first - next_frame_, segment.first_tick - next_tick_),
                 "the segment starts at tick " + std::to_string(segment.first_tick) +
                     ", which does not fit frame " + std::to_string(first));
-  return require(
+  RELIT_REQUIRE(
       end_tick <= duration_ticks_ && can_last(frame_count_ - end, duration_ticks_ - end_tick),
       "the segment ends at tick " + std::to_string(end_tick) + ", which does not fit the clip's " +
           std::to_string(duration_ticks_));

@@ -2,6 +2,8 @@
 #include "player/clip_reader.hpp"
 
 #include <algorithm>
+#include <iterator>
+#include <utility>
 
 namespace relit::player {
 namespace {
@@ -62,7 +64,9 @@ Status ClipReader::choose_clip(const std::string& wanted) {
 
 Result<ClipReader> ClipReader::open(std::unique_ptr<container::ByteSource> source,
                                     const std::string& name, const ClipOptions& options) {
-  auto reader = container::Reader::open(std::move(source));
+  container::ReaderOptions reading;
+  reading.sparing = options.spares_bytes();
+  auto reader = container::Reader::open(std::move(source), reading);
   if (!reader) return fail(reader.error().code, name + ": " + reader.error().message);
   ClipReader clip(std::move(*reader), name);
   auto contents = container::load_static(clip.reader_);
@@ -83,6 +87,12 @@ Result<ClipReader> ClipReader::open(std::unique_ptr<container::ByteSource> sourc
     if (!planes) return clip.in_file(planes.error());
     clip.planes_ = std::move(*planes);
   }
+  // Pose, mantissas and exponents of the most important layer.
+  clip.impatient_ = options.impatient;
+  const bool exponents = tracks.size() > 1 && clip.layers_.front().has_exponents;
+  clip.first_picture_.assign(
+      tracks.begin(),
+      tracks.begin() + std::min<std::ptrdiff_t>(std::ssize(tracks), exponents ? 3 : 2));
   std::sort(tracks.begin(), tracks.end());
   clip.tracks_ = tracks;
   clip.reader_.set_wanted_tracks(std::move(tracks));
@@ -113,6 +123,12 @@ PlaybackLoss ClipReader::loss() const {
   return loss;
 }
 
+void ClipReader::note_arrival(std::uint32_t track_id) {
+  // Chunks come in the order that the segment lists: after the last one it need not be waited for.
+  if (track_id == last_chunk_) complete_end_ = segment_->first_frame + segment_->frame_count;
+  if (impatient_) std::erase(first_picture_, track_id);
+}
+
 Status ClipReader::take(container::Record record) {
   if (auto* segment = std::get_if<container::SegmentRecord>(&record.body)) {
     if (segment_) complete_end_ = segment_->first_frame + segment_->frame_count;
@@ -140,8 +156,7 @@ Status ClipReader::take(container::Record record) {
   }
   auto* chunk = std::get_if<container::ChunkRecord>(&record.body);
   if (chunk == nullptr || !segment_) return {};
-  // Chunks come in the order that the segment lists: after the last one it need not be waited for.
-  if (chunk->track_id == last_chunk_) complete_end_ = segment_->first_frame + segment_->frame_count;
+  note_arrival(chunk->track_id);
   if (chunk->track_id != pose_track_) {
     if (!planes_) return {};
     const Status status = planes_->add_chunk(*segment_, std::move(*chunk));
@@ -157,6 +172,9 @@ Status ClipReader::take(container::Record record) {
 Status ClipReader::read_until(std::uint64_t index) {
   wanted_frame_ = index;
   while (!ended_ && complete_end_ <= index) {
+    const bool enough = segment_ && index < segment_->first_frame + segment_->frame_count &&
+                        impatient_ && first_picture_.empty();
+    if (enough) break;
     auto record = reader_.next();
     if (record && *record) {
       RELIT_TRY(take(std::move(**record)));
@@ -209,6 +227,15 @@ Result<bool> ClipReader::jump(std::uint64_t index) {
   return true;
 }
 
+Status ClipReader::decode(std::uint64_t index) {
+  RELIT_TRY(poses_->sample(static_cast<double>(index), scratch_.pose));
+  if (!planes_) return {};
+  Status decoded = planes_->frame(index, scratch_.planes);
+  const bool early = std::exchange(impatient_, false) && first_picture_.empty();
+  if (!decoded && decoded.error().code == ErrorCode::kNotFound && early) return {};
+  return decoded;
+}
+
 Status ClipReader::frame(std::uint64_t index, ClipFrame& out) {
   if (index >= clip_.frame_count) {
     return fail(ErrorCode::kNotFound, name_ + ": no frame " + std::to_string(index) + "; clip \"" +
@@ -226,8 +253,7 @@ Status ClipReader::frame(std::uint64_t index, ClipFrame& out) {
     }
   }
   RELIT_TRY(read_until(index));
-  Status decoded = poses_->sample(static_cast<double>(index), scratch_.pose);
-  if (decoded && planes_) decoded = planes_->frame(index, scratch_.planes);
+  const Status decoded = decode(index);
   if (decoded) {
     std::swap(out, scratch_);
     shown_ = true;

@@ -12,6 +12,7 @@
 #include "player/clip_reader.hpp"
 #include "player/light.hpp"
 #include "player/scene_view.hpp"
+#include "player/source.hpp"
 
 /// What the commands of `relit` share. Messages go to standard error, data and JSON to standard
 /// output.
@@ -27,8 +28,18 @@ enum ExitStatus : int {
 /// Prints the error and returns the exit status it means.
 int report(const Error& error);
 
-/// Opens a clip as the user named it.
-[[nodiscard]] Result<ClipReader> open_clip(const std::string& source, const ClipOptions& options);
+/// SRC and --http-header.
+struct SourceArguments {
+  std::string name;
+  std::vector<std::string> http_headers;
+};
+/// `help` describes SRC.
+void add_source_options(CLI::App& command, SourceArguments& arguments, const std::string& help);
+/// Opens SRC as the user named it; warnings go to standard error.
+[[nodiscard]] Result<std::unique_ptr<container::ByteSource>> open_source(
+    const SourceArguments& arguments, bool sparing);
+[[nodiscard]] Result<ClipReader> open_clip(const SourceArguments& arguments,
+                                           const ClipOptions& options);
 
 /// Says what was lost, if anything, and returns kSuccess or kWithLosses.
 int report_loss(const PlaybackLoss& loss);

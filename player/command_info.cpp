@@ -4,20 +4,19 @@
 #include "decoders/sh.hpp"
 #include "player/command.hpp"
 #include "player/file_survey.hpp"
-#include "player/source.hpp"
 
 namespace relit::player {
 namespace {
 
 struct Arguments {
-  std::string source;
+  SourceArguments source;
   bool json = false;
 };
 
 Result<FileSurvey> survey(const Arguments& arguments) {
-  RELIT_ASSIGN(auto source, open_source(arguments.source));
+  RELIT_ASSIGN(auto source, open_source(arguments.source, !arguments.json));
   auto found = survey_file(std::move(source), arguments.json);
-  if (!found) return fail(found.error().code, arguments.source + ": " + found.error().message);
+  if (!found) return fail(found.error().code, arguments.source.name + ": " + found.error().message);
   return found;
 }
 
@@ -79,10 +78,11 @@ int run(const Arguments& arguments) {
                             .dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace)
                             .c_str());
   } else {
-    print(*found, arguments.source);
+    print(*found, arguments.source.name);
   }
   if (found->damage.empty()) return kSuccess;
-  std::fprintf(stderr, "relit: %s: damaged: %s\n", arguments.source.c_str(), found->damage.c_str());
+  std::fprintf(stderr, "relit: %s: damaged: %s\n", arguments.source.name.c_str(),
+               found->damage.c_str());
   return kWithLosses;
 }
 
@@ -91,7 +91,7 @@ int run(const Arguments& arguments) {
 Command add_info(CLI::App& app) {
   CLI::App* command = app.add_subcommand("info", "say what a file holds");
   const auto arguments = std::make_shared<Arguments>();
-  command->add_option("source", arguments->source, "path, - or http(s)://")->required();
+  add_source_options(*command, arguments->source, "path, - or http(s)://");
   command->add_flag("--json", arguments->json, "as JSON, to standard output");
   return [arguments] { return run(*arguments); };
 }
