@@ -107,17 +107,38 @@ Status ClipReader::note_damage(const Error& error) {
   return {};
 }
 
+void ClipReader::note_segment(const container::IndexRecord::Entry& entry) {
+  segments_.insert_or_assign(entry.first_frame, entry);
+  first_frames_.insert_or_assign(entry.first_tick, entry.first_frame);
+}
+
+PlaybackLoss ClipReader::loss() const {
+  PlaybackLoss loss = loss_;
+  const container::ReaderLoss lost = reader_.loss();
+  loss.records =
+      lost.damaged_records - std::min<std::uint64_t>(lost.damaged_records, contents_.repaired);
+  loss.segments = lost.missing_segments;
+  return loss;
+}
+
 Status ClipReader::take(container::Record record) {
   if (auto* segment = std::get_if<container::SegmentRecord>(&record.body)) {
     if (segment_) complete_end_ = segment_->first_frame + segment_->frame_count;
     segment_.reset();
-    if (segment->clip_id != clip_.id) {
+    const bool ours = segment->clip_id == clip_.id;
+    if (ours) {
+      note_segment({segment->index, segment->clip_id, segment->first_frame, segment->frame_count,
+                    record.offset_bytes, segment->first_tick});
+      timeline_.add(*segment);
+      complete_end_ = std::max(complete_end_, segment->first_frame);
+    }
+    // On the way to a frame further on nothing of what lies before its segment is decoded.
+    const std::uint64_t end = segment->first_frame + segment->frame_count;
+    if (!ours || end <= wanted_frame_) {
+      if (ours) complete_end_ = end;
       reader_.skip_segment();
       return {};
     }
-    seen_.push_back({segment->index, segment->clip_id, segment->first_frame, segment->frame_count,
-                     record.offset_bytes, segment->first_tick});
-    timeline_.add(*segment);
     segment_ = std::move(*segment);
     for (const auto& chunk : segment_->chunks) {
       if (std::binary_search(tracks_.begin(), tracks_.end(), chunk.track_id))
@@ -142,6 +163,7 @@ Status ClipReader::take(container::Record record) {
 }
 
 Status ClipReader::read_until(std::uint64_t index) {
+  wanted_frame_ = index;
   while (!ended_ && complete_end_ <= index) {
     auto record = reader_.next();
     if (record && *record) {
@@ -165,10 +187,13 @@ Status ClipReader::read_until(std::uint64_t index) {
 // A file without an index was cut, or is still being written: what has been read so far serves as
 // one.
 Status ClipReader::load_index() {
-  if (index_ || !reader_.seekable()) return {};
-  auto found = reader_.read_index();
+  if (index_loaded_ || !reader_.seekable()) return {};
+  index_loaded_ = true;
+  const auto found = reader_.read_index();
   if (!found && found.error().code == ErrorCode::kIo) return in_file(found.error());
-  index_ = found ? std::move(*found) : container::IndexRecord{};
+  if (!found) return {};
+  for (const auto& entry : found->segments)
+    if (entry.clip_id == clip_.id) note_segment(entry);
   return {};
 }
 
@@ -177,15 +202,10 @@ Status ClipReader::load_index() {
 Result<bool> ClipReader::jump(std::uint64_t index) {
   if (!reader_.seekable()) return false;
   RELIT_TRY(load_index());
-  const auto holds = [&](const container::IndexRecord::Entry& e) {
-    return e.clip_id == clip_.id && e.first_frame <= index && index < e.first_frame + e.frame_count;
-  };
-  auto entry = std::find_if(index_->segments.begin(), index_->segments.end(), holds);
-  if (entry == index_->segments.end()) {
-    entry = std::find_if(seen_.begin(), seen_.end(), holds);
-    if (entry == seen_.end()) return false;
-  }
-  const container::IndexRecord::Entry target = *entry;
+  const auto next = segments_.upper_bound(index);
+  if (next == segments_.begin()) return false;
+  const container::IndexRecord::Entry target = std::prev(next)->second;
+  if (index >= target.first_frame + target.frame_count) return false;
   if (const Status status = reader_.seek_to_segment(target); !status) {
     RELIT_TRY(note_damage(status.error()));
     auto found = reader_.resync();
@@ -247,16 +267,11 @@ Result<std::uint64_t> ClipReader::find_frame(std::uint64_t tick) {
   if (const auto known = timeline_.frame_at(tick)) return *known;
   // The segment that begins last before the tick says which of its frames is shown.
   RELIT_TRY(load_index());
-  if (index_) {
-    const container::IndexRecord::Entry* entry = nullptr;
-    for (const auto& e : index_->segments) {
-      if (e.clip_id == clip_.id && e.first_tick <= tick) entry = &e;
-    }
-    if (entry != nullptr) {
-      const std::uint64_t first = entry->first_frame;
-      RELIT_ASSIGN(const bool jumped, jump(first));
-      if (jumped) RELIT_TRY(read_until(first));
-    }
+  const auto next = first_frames_.upper_bound(tick);
+  if (next != first_frames_.begin()) {
+    const std::uint64_t first = std::prev(next)->second;
+    RELIT_ASSIGN(const bool jumped, jump(first));
+    if (jumped) RELIT_TRY(read_until(first));
   }
   for (;;) {
     if (const auto known = timeline_.frame_at(tick)) return *known;

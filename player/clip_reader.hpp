@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -26,8 +27,10 @@ struct ClipOptions {
 
 /// What was lost to damage so far.
 struct PlaybackLoss {
-  std::uint64_t frames = 0;  ///< shown with older planes or poses
-  std::string first;         ///< the first reason, for the user
+  std::uint64_t frames = 0;    ///< shown with older planes or poses
+  std::uint64_t records = 0;   ///< dropped because they were damaged
+  std::uint64_t segments = 0;  ///< that never came, by the gaps in their numbers
+  std::string first;           ///< the first reason, for the user
   [[nodiscard]] bool any() const { return frames != 0 || !first.empty(); }
 };
 
@@ -52,7 +55,7 @@ class ClipReader {
   [[nodiscard]] const container::ModelRecord& model() const { return model_; }
   [[nodiscard]] const std::vector<container::LayerRecord>& layers() const { return layers_; }
   [[nodiscard]] const std::vector<decoders::Mesh>& meshes() const { return meshes_; }
-  [[nodiscard]] const PlaybackLoss& loss() const { return loss_; }
+  [[nodiscard]] PlaybackLoss loss() const;
 
   /// Decodes frame `index` of the clip. Errors: kNotFound beyond the clip, or behind what was read
   /// where the source cannot seek, or when nothing that could be shown has arrived; kIo,
@@ -79,6 +82,7 @@ class ClipReader {
   Status choose_clip(const std::string& wanted);
   Status read_until(std::uint64_t index);
   Status load_index();
+  void note_segment(const container::IndexRecord::Entry& entry);
   Result<bool> jump(std::uint64_t index);
   Status take(container::Record record);
   Status note_damage(const Error& error);
@@ -97,10 +101,12 @@ class ClipReader {
   std::optional<decoders::PlaneDecoder> planes_;
   std::vector<std::uint32_t> tracks_;  ///< wanted, sorted
   container::Timeline timeline_;
-  std::optional<container::IndexRecord> index_;
-  std::vector<container::IndexRecord::Entry> seen_;  ///< segments of the clip that went by
+  std::map<std::uint64_t, container::IndexRecord::Entry> segments_;  ///< known ones, by first frame
+  std::map<std::uint64_t, std::uint64_t> first_frames_;              ///< of the same, by first tick
+  bool index_loaded_ = false;
   std::optional<container::SegmentRecord> segment_;  ///< whose chunks are coming in
   std::uint32_t last_chunk_ = 0;                     ///< track of the last one that is wanted
+  std::uint64_t wanted_frame_ = 0;                   ///< that read_until() is on its way to
   std::uint64_t complete_end_ = 0;                   ///< frames before this one have come
   std::uint64_t kept_begin_ = 0;                     ///< frames before this one have been forgotten
   ClipFrame scratch_;

@@ -31,8 +31,12 @@ Result<ClipReader> open_clip(const std::string& source, const ClipOptions& optio
 
 int report_loss(const PlaybackLoss& loss) {
   if (!loss.any()) return kSuccess;
-  std::fprintf(stderr, "relit: damaged: %llu frames show older light; first: %s\n",
-               static_cast<unsigned long long>(loss.frames), loss.first.c_str());
+  std::fprintf(
+      stderr,
+      "relit: damaged: %llu records dropped, %llu segments missing, %llu frames show older "
+      "light; first: %s\n",
+      static_cast<unsigned long long>(loss.records), static_cast<unsigned long long>(loss.segments),
+      static_cast<unsigned long long>(loss.frames), loss.first.c_str());
   return kWithLosses;
 }
 
