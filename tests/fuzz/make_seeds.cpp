@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <initializer_list>
 #include <iterator>
 #include <string>
 #include <vector>
@@ -23,6 +24,7 @@ namespace {
 using namespace relit;
 using namespace relit::container;
 using fuzz::Bytes;
+using Numbers = std::initializer_list<std::uint8_t>;
 namespace fs = std::filesystem;
 
 class Seeds {
@@ -77,7 +79,7 @@ void add_records(Seeds& seeds, const Bytes& file, const std::string& name) {
 
 /// A whole file for each way in which the fuzzers of files may take it.
 void add_file(Seeds& seeds, const Bytes& file, const std::string& name) {
-  for (const std::uint8_t how : {0, 1, 2, 8}) {
+  for (const std::uint8_t how : Numbers{0, 1, 2, 8}) {
     const std::string variant = name + "_" + std::to_string(how);
     seeds.add("container_fuzz", variant, with_prefix({how}, file));
     seeds.add("play_fuzz", variant, with_prefix({how}, file));
@@ -106,7 +108,7 @@ void add_mesh(Seeds& seeds, MeshRecord mesh, const std::string& name) {
 }
 
 void add_meshes(Seeds& seeds) {
-  for (const std::size_t influences : {0, 1, 2}) {
+  for (const std::size_t influences : Numbers{0, 1, 2}) {
     MeshRecord mesh = test::quad(influences);
     add_mesh(seeds, mesh, "quad" + std::to_string(influences));
     using test::stream;
@@ -140,10 +142,10 @@ Bytes pose_seed(const SkeletonRecord& skeleton, const PoseTrackRecord& track, st
 void add_poses(Seeds& seeds) {
   for (const bool plain : {false, true}) {
     const std::string suffix = plain ? "_plain" : "";
-    for (const std::uint8_t mode : {0, 1, 2})
+    for (const std::uint8_t mode : Numbers{0, 1, 2})
       seeds.add("pose_fuzz", "joints" + std::to_string(mode) + suffix,
                 pose_seed(sample::skeleton(), sample::pose_track(), 7, mode, plain));
-    for (const std::uint8_t mode : {0, 5, 6})
+    for (const std::uint8_t mode : Numbers{0, 5, 6})
       seeds.add("pose_fuzz", "vertices" + std::to_string(mode) + suffix,
                 pose_seed({}, sample::vertex_track(), 9, mode, plain));
   }
@@ -187,7 +189,7 @@ Bytes coded_file(const bake::test::Encoded& encoded, std::uint32_t frames) {
   if (!writer) return {};
   bool good = static_cast<bool>(
       writer->add(ClipRecord{3, "c", {25, 1}, frames, true, {-9, -9, -9}, {9, 9, 9}, frames}));
-  MeshRecord mesh = test::quad(0);
+  MeshRecord mesh = test::quad(std::size_t{0});
   mesh.material_id = 9;
   MaterialRecord material;
   material.id = 9;
@@ -331,9 +333,9 @@ Bytes make_exr() {
 
 void add_models(Seeds& seeds) {
   using test::GltfBuilder;
-  const GltfBuilder quad = test::file_with(test::quad());
-  seeds.add("gltf_fuzz", "quad.glb", quad.glb());
-  seeds.add("gltf_fuzz", "quad.gltf", text(quad.gltf()));
+  const GltfBuilder plain = test::file_with(test::triangle());
+  seeds.add("gltf_fuzz", "plain.glb", plain.glb());
+  seeds.add("gltf_fuzz", "plain.gltf", text(plain.gltf()));
   GltfBuilder full;
   auto spec = test::triangle();
   spec.colors.assign(12, 0.5f);
