@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
-#include <new>
 #include <string>
 #include <type_traits>
 
+#include "container/base/out_of_memory.hpp"
 #include "container/reader.hpp"
 #include "container/references.hpp"
 
@@ -120,12 +120,8 @@ const R* find_by_id(const std::vector<R>& records, std::uint32_t id) {
 }  // namespace
 
 Result<FileContents> load_static(Reader& reader) {
-  try {
-    return load(reader);
-  } catch (const std::bad_alloc&) {
-    return fail(ErrorCode::kOutOfMemory, "out of memory while reading the records before byte " +
-                                             std::to_string(reader.offset_bytes()));
-  }
+  return catch_out_of_memory("reading the records before the first segment",
+                             [&] { return load(reader); });
 }
 
 const ClipRecord* FileContents::find_clip(std::uint32_t id) const { return find_by_id(clips, id); }

@@ -2,9 +2,9 @@
 #include "container/reader.hpp"
 
 #include <algorithm>
-#include <new>
 #include <string>
 
+#include "container/base/out_of_memory.hpp"
 #include "container/record_codec.hpp"
 #include "container/references.hpp"
 
@@ -48,10 +48,12 @@ bool is_single(RecordType type) {
 }  // namespace
 
 Result<Reader> Reader::open(std::unique_ptr<ByteSource> source, const ReaderOptions& options) {
-  Reader reader(std::move(source), options);
-  RELIT_TRY(reader.read_header());
-  if (options.sparing) RELIT_TRY(reader.learn_layout());
-  return reader;
+  return catch_out_of_memory("opening a file", [&]() -> Result<Reader> {
+    Reader reader(std::move(source), options);
+    RELIT_TRY(reader.read_header());
+    if (options.sparing) RELIT_TRY(reader.learn_layout());
+    return reader;
+  });
 }
 
 Status Reader::read_header() {
@@ -88,9 +90,8 @@ Result<std::optional<Record>> Reader::next() {
   try {
     return next_record();
   } catch (const std::bad_alloc&) {
-    input_.lose_framing({ErrorCode::kOutOfMemory,
-                         "out of memory at byte " + std::to_string(input_.offset_bytes())});
-    return fail(ErrorCode::kOutOfMemory, "out of memory while reading a record");
+    input_.lose_framing(out_of_memory("reading a record"));
+    return Unexpected{out_of_memory("reading a record")};
   }
 }
 
@@ -301,8 +302,10 @@ Status Reader::accept_end(const EndRecord& end, std::uint64_t offset) const {
 }
 
 Result<bool> Reader::static_part_ended() {
-  RELIT_ASSIGN(const auto header, peek_known());
-  return !header || order_of(header->type) >= kSegmentOrder;
+  return catch_out_of_memory("looking for the next record", [&]() -> Result<bool> {
+    RELIT_ASSIGN(const auto header, peek_known());
+    return !header || order_of(header->type) >= kSegmentOrder;
+  });
 }
 
 void Reader::set_wanted_tracks(std::optional<std::vector<std::uint32_t>> tracks) {
@@ -327,10 +330,12 @@ void Reader::enter_segments() {
 }
 
 Result<bool> Reader::resync() {
-  if (fatal_) return Unexpected{*fatal_};
-  RELIT_ASSIGN(const bool found, input_.resync());
-  enter_segments();
-  return found;
+  return catch_out_of_memory("looking for the next segment", [&]() -> Result<bool> {
+    if (fatal_) return Unexpected{*fatal_};
+    RELIT_ASSIGN(const bool found, input_.resync());
+    enter_segments();
+    return found;
+  });
 }
 
 ReaderLoss Reader::loss() const {
@@ -456,28 +461,34 @@ Status Reader::learn_layout() {
 }
 
 Result<IndexRecord> Reader::read_index() {
-  return read_aside(
-      [](RecordInput& input, std::uint64_t size) { return read_index_from_end(input, size); });
+  return catch_out_of_memory("reading the index", [&] {
+    return read_aside(
+        [](RecordInput& input, std::uint64_t size) { return read_index_from_end(input, size); });
+  });
 }
 
 Result<std::vector<std::optional<Record>>> Reader::read_copies() {
-  return read_aside([this](RecordInput& input, std::uint64_t size) {
-    return read_copies_from_end(input, size, options_);
+  return catch_out_of_memory("reading the copies of the static records", [&] {
+    return read_aside([this](RecordInput& input, std::uint64_t size) {
+      return read_copies_from_end(input, size, options_);
+    });
   });
 }
 
 Status Reader::seek_to_segment(const IndexRecord::Entry& entry) {
-  if (fatal_) return Unexpected{*fatal_};
-  RELIT_TRY(input_.seek(entry.offset));
-  enter_segments();
-  next_segment_index_.reset();
-  sought_ = entry;
-  RELIT_ASSIGN(const auto header, peek_known());
-  if (header && header->type == types::kSegment) return {};
-  Error error{ErrorCode::kCorrupt,
-              "the index says that a segment starts at byte " + std::to_string(entry.offset)};
-  input_.lose_framing(error);
-  return Unexpected{std::move(error)};
+  return catch_out_of_memory("going to a segment", [&]() -> Status {
+    if (fatal_) return Unexpected{*fatal_};
+    RELIT_TRY(input_.seek(entry.offset));
+    enter_segments();
+    next_segment_index_.reset();
+    sought_ = entry;
+    RELIT_ASSIGN(const auto header, peek_known());
+    if (header && header->type == types::kSegment) return {};
+    Error error{ErrorCode::kCorrupt,
+                "the index says that a segment starts at byte " + std::to_string(entry.offset)};
+    input_.lose_framing(error);
+    return Unexpected{std::move(error)};
+  });
 }
 
 }  // namespace relit::container

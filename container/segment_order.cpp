@@ -35,6 +35,7 @@ Status SegmentOrder::check(const SegmentRecord& segment) const {
       end_tick <= duration_ticks_ && can_last(frame_count_ - end, duration_ticks_ - end_tick),
       "the segment ends at tick " + std::to_string(end_tick) + ", which does not fit the clip's " +
           std::to_string(duration_ticks_));
+  return {};
 }
 
 void SegmentOrder::accept(const SegmentRecord& segment) {

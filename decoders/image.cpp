@@ -15,6 +15,7 @@ extern "C" {
 #include <string>
 
 #include "container/base/limits.hpp"
+#include "container/base/out_of_memory.hpp"
 #include "decoders/ffmpeg.hpp"
 
 namespace relit::decoders {
@@ -196,21 +197,7 @@ Result<DecodedImage> to_rgba(const AVFrame& frame) {
   return image;
 }
 
-}  // namespace
-
-std::string_view image_media_type(std::span<const std::uint8_t> bytes) {
-  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  for (const Signature& signature : kSignatures) {
-    if (text.size() >= signature.offset + signature.bytes.size() &&
-        text.substr(signature.offset, signature.bytes.size()) == signature.bytes) {
-      return signature.media_type;
-    }
-  }
-  return {};
-}
-
-Result<DecodedImage> decode_image(std::span<const std::uint8_t> bytes,
-                                  std::string_view media_type) {
+Result<DecodedImage> decode(std::span<const std::uint8_t> bytes, std::string_view media_type) {
   const std::string_view type = image_media_type(bytes);
   if (type != "image/png" && type != "image/jpeg") {
     const std::string_view told = type.empty() ? media_type : type;
@@ -231,6 +218,24 @@ Result<DecodedImage> decode_image(std::span<const std::uint8_t> bytes,
     return fail(ErrorCode::kUnsupported, "CMYK JPEG pictures are not supported; save it as RGB");
   }
   return to_rgba(*frame);
+}
+
+}  // namespace
+
+std::string_view image_media_type(std::span<const std::uint8_t> bytes) {
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  for (const Signature& signature : kSignatures) {
+    if (text.size() >= signature.offset + signature.bytes.size() &&
+        text.substr(signature.offset, signature.bytes.size()) == signature.bytes) {
+      return signature.media_type;
+    }
+  }
+  return {};
+}
+
+Result<DecodedImage> decode_image(std::span<const std::uint8_t> bytes,
+                                  std::string_view media_type) {
+  return catch_out_of_memory("decoding a picture", [&] { return decode(bytes, media_type); });
 }
 
 }  // namespace relit::decoders

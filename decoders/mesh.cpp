@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "container/base/limits.hpp"
+#include "container/base/out_of_memory.hpp"
 #include "decoders/inflate.hpp"
 
 namespace relit::decoders {
@@ -320,15 +321,17 @@ Status decode_morph_targets(const MeshRecord& record, Mesh& mesh) {
 
 Result<Mesh> decode_mesh(const container::MeshRecord& record, std::size_t palette_size,
                          std::size_t morph_weight_count) {
-  RELIT_TRY(check_counts(record, morph_weight_count));
-  Mesh mesh;
-  mesh.name = record.name;
-  mesh.id = record.id;
-  mesh.material_id = record.material_id;
-  RELIT_TRY(StreamDecoder(record, palette_size, mesh).run());
-  RELIT_TRY(decode_morph_targets(record, mesh));
-  RELIT_TRY(decode_indices(record, mesh));
-  return mesh;
+  return catch_out_of_memory("decoding a mesh", [&]() -> Result<Mesh> {
+    RELIT_TRY(check_counts(record, morph_weight_count));
+    Mesh mesh;
+    mesh.name = record.name;
+    mesh.id = record.id;
+    mesh.material_id = record.material_id;
+    RELIT_TRY(StreamDecoder(record, palette_size, mesh).run());
+    RELIT_TRY(decode_morph_targets(record, mesh));
+    RELIT_TRY(decode_indices(record, mesh));
+    return mesh;
+  });
 }
 
 }  // namespace relit::decoders

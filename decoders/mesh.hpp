@@ -39,7 +39,8 @@ struct Mesh {
 /// product with a pose overflows.
 inline constexpr float kMaxCoordinate = 1e9f;
 
-/// Decodes a mesh. Errors: kCorrupt, kLimit. Every index, joint (< palette_size) and morph weight
+/// Decodes a mesh. Errors: kCorrupt, kLimit, kOutOfMemory. Every index, joint (< palette_size) and
+/// morph weight
 /// (< morph_weight_count) of the result is in range, every float finite.
 [[nodiscard]] Result<Mesh> decode_mesh(const container::MeshRecord& record,
                                        std::size_t palette_size, std::size_t morph_weight_count);

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "container/base/limits.hpp"
+#include "container/base/out_of_memory.hpp"
 #include "decoders/sh.hpp"
 
 namespace relit::decoders {
@@ -200,40 +201,52 @@ void LayerDecoder::forget_before(std::uint64_t frame) {
 Result<PlaneDecoder> PlaneDecoder::open(const ModelRecord& model,
                                         std::span<const LayerRecord> layers,
                                         const PlaneDecoderOptions& options) {
-  if (!options.wanted.empty() && options.wanted.size() != layers.size()) {
-    return fail(ErrorCode::kInvalid, "one choice for each of the " + std::to_string(layers.size()) +
-                                         " layers is needed, got " +
-                                         std::to_string(options.wanted.size()));
-  }
-  PlaneDecoder decoder;
-  for (std::size_t i = 0; i < layers.size(); ++i) {
-    decoder.first_plane_.push_back(decoder.plane_count_);
-    decoder.plane_count_ += layers[i].planes.size();
-    if (decoder.plane_count_ > limits::kPlanes) {
-      return fail(ErrorCode::kLimit, "more than " + std::to_string(limits::kPlanes) + " planes");
+  return catch_out_of_memory("opening the decoders of a model", [&]() -> Result<PlaneDecoder> {
+    if (!options.wanted.empty() && options.wanted.size() != layers.size()) {
+      return fail(ErrorCode::kInvalid,
+                  "one choice for each of the " + std::to_string(layers.size()) +
+                      " layers is needed, got " + std::to_string(options.wanted.size()));
     }
-    decoder.layers_.emplace_back();
-    if (!options.wanted.empty() && !options.wanted[i]) continue;
-    RELIT_ASSIGN(LayerDecoder layer, LayerDecoder::open(model, layers[i], options.threads));
-    decoder.layers_.back().emplace(std::move(layer));
-  }
-  return decoder;
+    PlaneDecoder decoder;
+    for (std::size_t i = 0; i < layers.size(); ++i) {
+      decoder.first_plane_.push_back(decoder.plane_count_);
+      decoder.plane_count_ += layers[i].planes.size();
+      if (decoder.plane_count_ > limits::kPlanes) {
+        return fail(ErrorCode::kLimit, "more than " + std::to_string(limits::kPlanes) + " planes");
+      }
+      decoder.layers_.emplace_back();
+      if (!options.wanted.empty() && !options.wanted[i]) continue;
+      RELIT_ASSIGN(LayerDecoder layer, LayerDecoder::open(model, layers[i], options.threads));
+      decoder.layers_.back().emplace(std::move(layer));
+    }
+    return decoder;
+  });
 }
 
 Status PlaneDecoder::add_chunk(const container::SegmentRecord& segment,
                                container::ChunkRecord chunk) {
-  for (std::optional<LayerDecoder>& layer : layers_) {
-    if (!layer) continue;
-    const LayerRecord& record = layer->record();
-    if (chunk.track_id == record.mantissa_track ||
-        (record.has_exponents && chunk.track_id == record.exponent_track)) {
-      return layer->add_chunk(segment, std::move(chunk));
+  return catch_out_of_memory("taking a chunk", [&]() -> Status {
+    for (std::optional<LayerDecoder>& layer : layers_) {
+      if (!layer) continue;
+      const LayerRecord& record = layer->record();
+      if (chunk.track_id == record.mantissa_track ||
+          (record.has_exponents && chunk.track_id == record.exponent_track)) {
+        return layer->add_chunk(segment, std::move(chunk));
+      }
     }
-  }
-  return {};
+    return {};
+  });
 }
 
 Status PlaneDecoder::frame(std::uint64_t frame, FrameView& out) {
+  Status decoded =
+      catch_out_of_memory("decoding a frame", [&] { return decode_layers(frame, out); });
+  // Views of pictures that are gone must not stay.
+  if (!decoded && decoded.error().code == ErrorCode::kOutOfMemory) out.clear();
+  return decoded;
+}
+
+Status PlaneDecoder::decode_layers(std::uint64_t frame, FrameView& out) {
   out.planes_.resize(plane_count_);
   out.pictures_.resize(2 * layers_.size());
   out.frame_ = frame;

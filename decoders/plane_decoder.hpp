@@ -133,12 +133,13 @@ class PlaneDecoder {
                                    const PlaneDecoderOptions& options = {});
 
   /// Takes a chunk and keeps it until forget_before(); chunks of layers that are not wanted, or of
-  /// other tracks, are dropped. Errors: kCorrupt.
+  /// other tracks, are dropped. Errors: kCorrupt, kOutOfMemory.
   Status add_chunk(const container::SegmentRecord& segment, container::ChunkRecord chunk);
 
   /// The planes at `frame` (of the clip). Sequential use decodes every packet once; going elsewhere
   /// restarts at the segment. An error of one layer leaves the others filled and its planes empty,
-  /// and the first error is returned. Errors: kNotFound (chunk missing), kCorrupt (damage).
+  /// and the first error is returned. Errors: kNotFound (chunk missing), kCorrupt (damage),
+  /// kOutOfMemory, which empties all of them.
   Status frame(std::uint64_t frame, FrameView& out);
   Result<FrameView> frame(std::uint64_t frame);
 
@@ -148,6 +149,8 @@ class PlaneDecoder {
   [[nodiscard]] std::size_t plane_count() const { return plane_count_; }
 
  private:
+  Status decode_layers(std::uint64_t frame, FrameView& out);
+
   std::vector<std::optional<LayerDecoder>> layers_;
   std::vector<std::size_t> first_plane_;
   std::size_t plane_count_ = 0;

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "container/base/limits.hpp"
+#include "container/base/out_of_memory.hpp"
 #include "decoders/pose_packet.hpp"
 
 namespace relit::decoders {
@@ -125,23 +126,26 @@ Status check_skeleton(const container::SkeletonRecord& skeleton) {
 Result<PoseTrack> PoseTrack::create(const container::SkeletonRecord& skeleton,
                                     const container::PoseTrackRecord& track,
                                     std::span<const Mesh> meshes) {
-  RELIT_TRY(check_skeleton(skeleton));
-  PoseTrack out;
-  out.skeleton_ = skeleton;
-  out.track_ = track;
-  switch (track.kind) {
+  return catch_out_of_memory("preparing a pose track", [&]() -> Result<PoseTrack> {
+    RELIT_TRY(check_skeleton(skeleton));
+    PoseTrack out;
+    out.skeleton_ = skeleton;
+    out.track_ = track;
+    RELIT_TRY(out.plan(meshes));
+    return out;
+  });
+}
+
+Status PoseTrack::plan(std::span<const Mesh> meshes) {
+  switch (track_.kind) {
     case PoseKind::kJoints:
-      RELIT_TRY(out.plan_joints());
-      break;
+      return plan_joints();
     case PoseKind::kVertices:
-      RELIT_TRY(out.plan_vertices(meshes));
-      break;
-    default:
-      return fail(ErrorCode::kUnsupported, "pose track " + std::to_string(track.track_id) +
-                                               ": unknown kind " +
-                                               std::to_string(static_cast<int>(track.kind)));
+      return plan_vertices(meshes);
   }
-  return out;
+  return fail(ErrorCode::kUnsupported, "pose track " + std::to_string(track_.track_id) +
+                                           ": unknown kind " +
+                                           std::to_string(static_cast<int>(track_.kind)));
 }
 
 Status PoseTrack::plan_joints() {
@@ -240,6 +244,12 @@ Status PoseTrack::plan_vertices(std::span<const Mesh> meshes) {
 
 Status PoseTrack::add_packet(std::span<const std::uint8_t> packet, std::uint64_t first_frame,
                              std::uint32_t frame_count) {
+  return catch_out_of_memory("decoding a pose packet",
+                             [&] { return add_segment(packet, first_frame, frame_count); });
+}
+
+Status PoseTrack::add_segment(std::span<const std::uint8_t> packet, std::uint64_t first_frame,
+                              std::uint32_t frame_count) {
   const std::string where =
       "pose track " + std::to_string(track_.track_id) + ", frame " + std::to_string(first_frame);
   if (frame_count == 0 || frame_count > limits::kFramesPerSegment ||
@@ -303,6 +313,10 @@ const std::uint16_t* PoseTrack::frame_values(std::uint64_t frame) const {
 }
 
 Status PoseTrack::sample(double frame, Pose& pose) const {
+  return catch_out_of_memory("sampling a pose", [&] { return sample_at(frame, pose); });
+}
+
+Status PoseTrack::sample_at(double frame, Pose& pose) const {
   if (!std::isfinite(frame)) return fail(ErrorCode::kInvalid, "pose: the frame is not finite");
   frame = std::clamp(frame, 0.0, static_cast<double>(limits::kFrames));
   const auto whole = static_cast<std::uint64_t>(frame);

@@ -27,14 +27,15 @@ struct Pose {
 class PoseTrack {
  public:
   /// Checks the track against the skeleton and the meshes. A kVertices track has one range for each
-  /// mesh, in the order of `meshes`. Errors: kCorrupt, kLimit.
+  /// mesh, in the order of `meshes`. Errors: kCorrupt, kLimit, kOutOfMemory.
   static Result<PoseTrack> create(const container::SkeletonRecord& skeleton,
                                   const container::PoseTrackRecord& track,
                                   std::span<const Mesh> meshes);
 
   /// Decodes the packet of a segment: `frame_count` frames from `first_frame`. A segment that
   /// starts at the same frame is replaced. Frames stay until `forget_before` frees them. A failure
-  /// changes nothing. Errors: kCorrupt (damage, or frames that overlap another segment's), kLimit.
+  /// changes nothing. Errors: kCorrupt (damage, or frames that overlap another segment's), kLimit,
+  /// kOutOfMemory.
   Status add_packet(std::span<const std::uint8_t> packet, std::uint64_t first_frame,
                     std::uint32_t frame_count);
 
@@ -45,7 +46,7 @@ class PoseTrack {
   /// the rest linearly), written into `pose`. A negative frame is frame 0. Allocates nothing once
   /// `pose` has been used with this track. Errors: kNotFound when no frame at or before it is
   /// known, kInvalid when it is not finite, kCorrupt when the numbers of the file lead beyond all
-  /// bounds.
+  /// bounds, kOutOfMemory.
   Status sample(double frame, Pose& pose) const;
 
   /// Bytes that the decoded frames occupy.
@@ -75,6 +76,10 @@ class PoseTrack {
   };
 
   PoseTrack() = default;
+  Status plan(std::span<const Mesh> meshes);
+  Status add_segment(std::span<const std::uint8_t> packet, std::uint64_t first_frame,
+                     std::uint32_t frame_count);
+  Status sample_at(double frame, Pose& pose) const;
   Status plan_joints();
   Status plan_vertices(std::span<const Mesh> meshes);
   [[nodiscard]] const std::uint16_t* frame_values(std::uint64_t frame) const;

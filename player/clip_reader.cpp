@@ -5,6 +5,8 @@
 #include <iterator>
 #include <utility>
 
+#include "container/base/out_of_memory.hpp"
+
 namespace relit::player {
 namespace {
 
@@ -64,6 +66,12 @@ Status ClipReader::choose_clip(const std::string& wanted) {
 
 Result<ClipReader> ClipReader::open(std::unique_ptr<container::ByteSource> source,
                                     const std::string& name, const ClipOptions& options) {
+  return catch_out_of_memory("opening a clip",
+                             [&] { return open_clip(std::move(source), name, options); });
+}
+
+Result<ClipReader> ClipReader::open_clip(std::unique_ptr<container::ByteSource> source,
+                                         const std::string& name, const ClipOptions& options) {
   container::ReaderOptions reading;
   reading.sparing = options.spares_bytes();
   auto reader = container::Reader::open(std::move(source), reading);
@@ -237,6 +245,10 @@ Status ClipReader::decode(std::uint64_t index) {
 }
 
 Status ClipReader::frame(std::uint64_t index, ClipFrame& out) {
+  return catch_out_of_memory("decoding a frame", [&] { return decode_frame(index, out); });
+}
+
+Status ClipReader::decode_frame(std::uint64_t index, ClipFrame& out) {
   if (index >= clip_.frame_count) {
     return fail(ErrorCode::kNotFound, name_ + ": no frame " + std::to_string(index) + "; clip \"" +
                                           clip_.name + "\" has " +
@@ -267,6 +279,10 @@ Status ClipReader::frame(std::uint64_t index, ClipFrame& out) {
 }
 
 Result<std::uint64_t> ClipReader::frame_at(std::uint64_t tick) {
+  return catch_out_of_memory("looking for a frame", [&] { return find_frame(tick); });
+}
+
+Result<std::uint64_t> ClipReader::find_frame(std::uint64_t tick) {
   if (tick >= clip_.duration_ticks) {
     return fail(ErrorCode::kNotFound, name_ + ": clip \"" + clip_.name + "\" has ended at " +
                                           std::to_string(static_cast<double>(tick) *

@@ -55,7 +55,8 @@ class ClipReader {
  public:
   /// Reads everything static. `name` is for messages. Where options.spares_bytes(), the source is
   /// told what will be read; one that fetches ranges should have been opened so. Errors: those of
-  /// the reader and the decoders; kNotFound for a clip that is not there (names those that are).
+  /// the reader and the decoders; kNotFound for a clip that is not there (names those that are),
+  /// kOutOfMemory.
   static Result<ClipReader> open(std::unique_ptr<container::ByteSource> source,
                                  const std::string& name, const ClipOptions& options);
 
@@ -68,12 +69,13 @@ class ClipReader {
 
   /// Decodes frame `index` of the clip. Errors: kNotFound beyond the clip, or behind what was read
   /// where the source cannot seek, or when nothing that could be shown has arrived; kIo,
-  /// kCancelled. Damage is no error once a frame has been shown: the last one stays and loss()
-  /// counts.
+  /// kCancelled, kOutOfMemory. Damage is no error once a frame has been shown: the last one stays
+  /// and loss() counts.
   Status frame(std::uint64_t index, ClipFrame& out);
 
   /// The frame shown at `tick` of the clip. Where frames are unevenly spaced this may read ahead,
-  /// or seek. Errors: kNotFound beyond the clip or what can be read of it; kIo, kCancelled.
+  /// or seek. Errors: kNotFound beyond the clip or what can be read of it; kIo, kCancelled,
+  /// kOutOfMemory.
   Result<std::uint64_t> frame_at(std::uint64_t tick);
   /// When a frame that frame() has given begins, and how many ticks it is shown.
   [[nodiscard]] std::uint64_t first_tick(std::uint64_t index) const;
@@ -83,6 +85,10 @@ class ClipReader {
   ClipReader(container::Reader reader, std::string name)
       : reader_(std::move(reader)), name_(std::move(name)) {}
 
+  static Result<ClipReader> open_clip(std::unique_ptr<container::ByteSource> source,
+                                      const std::string& name, const ClipOptions& options);
+  Status decode_frame(std::uint64_t index, ClipFrame& out);
+  Result<std::uint64_t> find_frame(std::uint64_t tick);
   Status choose_clip(const std::string& wanted);
   Status read_until(std::uint64_t index);
   Status load_index();
