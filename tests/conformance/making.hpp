@@ -77,6 +77,22 @@ inline void from_bytes(Vectors& vectors, std::string name, std::string descripti
   });
 }
 
+/// A file that ends behind its static part, whose contents are to be refused for `finding`: nothing
+/// of what follows would be read.
+inline void from_static_draft(Vectors& vectors, std::string name, std::string description,
+                              std::string finding, std::function<void(Draft&)> change,
+                              const FigureOptions& options = plain_figure()) {
+  from_draft(
+      vectors, std::move(name), std::move(description),
+      refused({std::move(finding), "FEND_MISSING"}),
+      [change](Draft& draft) {
+        draft.segments.clear();
+        draft.copies = draft.index = draft.end = false;
+        change(draft);
+      },
+      options);
+}
+
 /// The payloads of a type, copies included.
 inline void each_payload(std::vector<Piece>& pieces, container::RecordType type,
                          const std::function<void(Bytes&)>& change) {

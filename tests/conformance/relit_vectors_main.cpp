@@ -1,6 +1,12 @@
 // SPDX-License-Identifier: MIT
 // relit-vectors FOLDER: writes the conformance vectors, each with its expectations beside it.
-#include <algorithm>
+#include <meshoptimizer.h>
+#include <zstd.h>
+
+extern "C" {
+#include <libavutil/avutil.h>
+}
+
 #include <cstdio>
 #include <exception>
 #include <filesystem>
@@ -46,22 +52,20 @@ const char* outcome_name(Outcome outcome) {
   return "?";
 }
 
-/// Arrays and objects on one line where they are short: a tenth of the lines of dump(1).
-void print(const ordered_json& json, std::size_t indent, std::string& out) {
-  const std::string line = json.dump();
-  if (!json.is_structured() || json.empty() || indent + line.size() <= 120) {
-    out += line;
+/// The members of an object on a line each, and so those of `info` and `frames`: small, and a
+/// change still shows where it is.
+void print(const ordered_json& json, std::size_t depth, std::string& out) {
+  if (!json.is_object() || json.empty() || depth > 1) {
+    out += json.dump();
     return;
   }
-  out += json.is_object() ? "{" : "[";
-  bool first = true;
+  const char* before = "{\n";
   for (const auto& [key, value] : json.items()) {
-    out += (first ? "\n" : ",\n") + std::string(indent + 1, ' ');
-    if (json.is_object()) out += ordered_json(key).dump() + ": ";
-    print(value, indent + 1, out);
-    first = false;
+    out += before + ordered_json(key).dump() + ":";
+    print(value, depth + 1, out);
+    before = ",\n";
   }
-  out += "\n" + std::string(indent, ' ') + (json.is_object() ? "}" : "]");
+  out += "}";
 }
 
 std::unique_ptr<container::ByteSource> memory(const Bytes& bytes) {
@@ -111,8 +115,17 @@ void write_vector(const Vector& vector, const std::filesystem::path& folder) {
   write(folder / (vector.name + ".json"), text + "\n");
 }
 
+/// The libraries whose bytes the vectors hold.
+void write_tools(const std::filesystem::path& folder) {
+  const ordered_json tools{{"ffmpeg", av_version_info()},
+                           {"zstd", ZSTD_versionString()},
+                           {"meshoptimizer", MESHOPTIMIZER_VERSION}};
+  write(folder / "TOOLS.json", tools.dump(1) + "\n");
+}
+
 int run(const std::filesystem::path& folder, const std::string& only) {
   std::filesystem::create_directories(folder);
+  write_tools(folder);
   int written = 0, failed = 0;
   for (const Vector& vector : all_vectors()) {
     if (vector.name.rfind(only, 0) != 0) continue;

@@ -33,6 +33,7 @@ using Vectors = std::vector<Vector>;
 
 void add_codings(Vectors& vectors);     ///< codecs, layouts, exponents, colour, order
 void add_structures(Vectors& vectors);  ///< what may be left out, repeated and added; extremes
+void add_extremes(Vectors& vectors);    ///< rigs, several clips, values at their limits
 void add_damage(Vectors& vectors);      ///< checksums, framing, truncation, versions, unknown types
 void add_payloads(Vectors& vectors);    ///< fields of single records out of their range
 void add_layer_payloads(Vectors& vectors);

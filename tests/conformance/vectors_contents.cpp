@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: MIT
 // Records that are fine by themselves, but whose coded bytes do not decode.
+#include <algorithm>
+#include <stdexcept>
+
 #include "bake_minimal/stream_encoder.hpp"
 #include "bake_minimal/vertex_quantizer.hpp"
+#include "bake_minimal/video_encoder.hpp"
 #include "tests/conformance/making.hpp"
 
 namespace relit::conformance {
@@ -44,7 +48,7 @@ void add_meshes(Vectors& vectors) {
   mesh(vectors, "mesh-stream-behind", "bytes behind a stream's end",
        [](M& m) { m.streams[0].bytes.push_back(0); });
   mesh(vectors, "mesh-vertices-other", "a stream of another number of vertices",
-       [](M& m) { m.vertex_count = 5; });
+       [](M& m) { m.vertex_count = 40; });
   mesh(vectors, "mesh-indices-other", "a stream of another number of indices",
        [](M& m) { m.index_count = 9; });
   mesh(vectors, "mesh-index-beyond", "an index beyond the vertices", [](M& m) {
@@ -104,12 +108,40 @@ void add_poses(Vectors& vectors) {
              });
   from_draft(vectors, "pose-matrix-infinite", "matrices whose product overflows",
              faulty({"DECODE_POSE_MATRIX"}), [](Draft& d) {
-               d.skeleton->nodes[0].local[0] = 1e30f;
-               d.skeleton->palette[1].inverse_bind[0] = 1e30f;
+               d.skeleton->nodes[0].local[0] = 1e8f;
+               d.skeleton->palette[1].inverse_bind[0] = 1e8f;
              });
 }
 
+/// Exponents of 3 everywhere, in every segment.
+void set_tiny_exponents(Draft& draft) {
+  LayerRecord& layer = draft.layers[0];
+  for (DraftSegment& segment : draft.segments) {
+    bake::VideoSettings settings;
+    settings.codec = "ffv1";
+    settings.width = layer.exponent_width, settings.height = layer.exponent_height;
+    settings.lossless = true;
+    auto encoder = bake::VideoEncoder::open(settings);
+    if (!encoder || !encoder->begin_picture()) throw std::runtime_error("no encoder for FFV1");
+    const bake::SampleTarget picture = encoder->target(0);
+    for (int y = 0; y < picture.height; ++y)
+      std::fill_n(picture.data + y * picture.stride_bytes, picture.width, std::uint8_t{3});
+    std::vector<bake::CodedPacket> packets;
+    const auto first = static_cast<std::int64_t>(segment.record.first_frame);
+    if (!encoder->encode(first, true, packets) || !encoder->finish(packets))
+      throw std::runtime_error("FFV1 does not encode");
+    layer.exponent_private = encoder->codec_private();
+    ChunkRecord& chunk = segment.chunks[2];
+    chunk.data = packets.at(0).bytes;
+    chunk.packets = {{first, true, 0, chunk.data.size()}};
+  }
+}
+
 void add_video(Vectors& vectors) {
+  FigureOptions exponents = plain_figure();
+  exponents.coding.exponent_block = 4;
+  from_draft(vectors, "exponent-tiny", "exponents smaller than writers emit",
+             noted({"VIDEO_EXPONENT"}), set_tiny_exponents, exponents);
   FigureOptions h264 = plain_figure();
   h264.coding.codec = "h264";
   h264.coding.preset = "medium";

@@ -100,7 +100,7 @@ void add_headers(Vectors& vectors) {
   }
   from_bytes(vectors, "length-segment", "a segment record longer than any can be",
              lossy({"FRAMING_LENGTH"}), [](Bytes& b) {
-               const std::size_t at = offset_of(b, types::kSegment);
+               const std::size_t at = offset_of(b, types::kSegment, 1);
                put_u64(b, at + 8, kMostSegmentPayloadBytes + 1);
                seal_header(b, at);
              });

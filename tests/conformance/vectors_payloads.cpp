@@ -25,7 +25,7 @@ struct Fault {
 
 void add_faults(Vectors& vectors, const std::vector<Fault>& faults) {
   for (const Fault& f : faults)
-    from_draft(vectors, f.name, f.description, refused({f.finding}), f.change);
+    from_static_draft(vectors, f.name, f.description, f.finding, f.change);
 }
 
 /// Overwrites bytes of every payload of a type.

@@ -19,9 +19,8 @@ void layer(Vectors& vectors, const char* name, const char* description, const ch
            std::function<void(LayerRecord&)> change) {
   FigureOptions options = plain_figure();
   options.coding.exponent_block = 4;
-  from_draft(
-      vectors, name, description, refused({finding}), [change](Draft& d) { change(d.layers[0]); },
-      options);
+  from_static_draft(
+      vectors, name, description, finding, [change](Draft& d) { change(d.layers[0]); }, options);
 }
 
 void add_layer_fields(Vectors& vectors) {
@@ -77,9 +76,8 @@ void add_layer_fields(Vectors& vectors) {
   FigureOptions odd = plain_figure();
   odd.coding.codec = "mpeg4";
   odd.coding.chroma = Chroma::k420;
-  from_draft(
-      vectors, "layer-odd-corner", "a 4:2:0 chroma plane at an odd sample",
-      refused({"LAYR_CORRUPT"}),
+  from_static_draft(
+      vectors, "layer-odd-corner", "a 4:2:0 chroma plane at an odd sample", "LAYR_CORRUPT",
       [](Draft& d) {
         d.layers[0].coded_width += 2;
         d.layers[0].planes[1].mantissa_rect.x = 1;

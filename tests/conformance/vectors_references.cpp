@@ -11,7 +11,7 @@ namespace {
 
 void broken(Vectors& vectors, const char* name, const char* description,
             std::function<void(Draft&)> change) {
-  from_draft(vectors, name, description, refused({"REF_INVALID"}), std::move(change));
+  from_static_draft(vectors, name, description, "REF_INVALID", std::move(change));
 }
 
 void add_ids(Vectors& vectors) {
@@ -75,21 +75,11 @@ void add_dangling(Vectors& vectors) {
          [](Draft& d) { d.layers[0].planes[0].matrix[0].coefficient = 1; });
   broken(vectors, "prediction-beyond-planes", "a prediction from a plane that is not there",
          [](Draft& d) { d.models[0].prediction_plane = 7; });
-  from_draft(vectors, "video-samples-limit", "more samples of video than any machine decodes",
-             refused({"REF_LIMIT"}), [](Draft& d) {
-               d.clips[0].frame_count = d.clips[0].duration_ticks = std::uint64_t{1} << 32;
-               d.layers[0].coded_width = d.layers[0].coded_height = 16384;
-             });
-  from_draft(vectors, "clips-limit", "1025 clips", refused({"REF_LIMIT"}), [](Draft& d) {
-    const ClipRecord clip = d.clips[0];
-    d = Draft();
-    d.copies = false;
-    for (std::uint32_t i = 0; i < 1025; ++i) {
-      d.clips.push_back(clip);
-      d.clips.back().id = i;
-      d.clips.back().name.clear();
-    }
-  });
+  from_static_draft(vectors, "video-samples-limit",
+                    "more samples of video than any machine decodes", "REF_LIMIT", [](Draft& d) {
+                      d.clips[0].frame_count = d.clips[0].duration_ticks = std::uint64_t{1} << 32;
+                      d.layers[0].coded_width = d.layers[0].coded_height = 16384;
+                    });
 }
 
 void add_order(Vectors& vectors) {
@@ -112,10 +102,7 @@ void add_order(Vectors& vectors) {
                 p.insert(p.begin() + static_cast<std::ptrdiff_t>(at), layer);
               });
   from_draft(vectors, "order-no-clip", "a file without clip", refused({"ORDER_NO_CLIP"}),
-             [](Draft& d) {
-               d = Draft();
-               d.copies = false;
-             });
+             [](Draft& d) { d = Draft(); });
   from_pieces(vectors, "chunk-stray", "a chunk that no segment announces", lossy({"CHNK_STRAY"}),
               [](std::vector<Piece>& p) {
                 const Piece chunk = p[find_piece(p, types::kChunk)];

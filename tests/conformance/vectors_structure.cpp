@@ -25,12 +25,12 @@ FigureOptions frames(int count, int segment = 2) {
 
 void add_omissions(Vectors& vectors) {
   good(vectors, "minimal", "all that a player needs, three frames in two segments", [](Draft&) {});
-  good(vectors, "without-index", "no INDX: found by reading forward",
-       [](Draft& d) { d.index = false; });
-  good(vectors, "without-copies", "no copies of the static part",
-       [](Draft& d) { d.copies = false; });
-  good(vectors, "live", "neither copies nor INDX nor FEND, as a live stream",
-       [](Draft& d) { d.copies = d.index = d.end = false; });
+  from_draft(vectors, "without-index", "no INDX: found by reading forward", noted({"INDX_MISSING"}),
+             [](Draft& d) { d.index = false; });
+  from_draft(vectors, "without-copies", "no copies of the static part", noted({"COPY_MISSING"}),
+             [](Draft& d) { d.copies = false; });
+  from_draft(vectors, "live", "neither copies nor INDX nor FEND, as a live stream",
+             noted({"FEND_MISSING"}), [](Draft& d) { d.copies = d.index = d.end = false; });
   good(vectors, "without-segments", "still meshes and nothing to play",
        [](Draft& d) { d.segments.clear(); });
   good(vectors, "clip-alone", "HEAD and CLIP, nothing else", [](Draft& d) {
@@ -97,6 +97,7 @@ void add_times(Vectors& vectors) {
 void add_structures(Vectors& vectors) {
   add_omissions(vectors);
   add_times(vectors);
+  add_extremes(vectors);
 }
 
 }  // namespace relit::conformance

@@ -350,7 +350,7 @@ TEST_CASE("whatever happened to a file, what recover writes is whole") {
     INFO("trial " << trial);
     std::mt19937 random(1000 + trial);
     Bytes damaged = file;
-    for (std::uint32_t i = random() % 40; i > 0; --i) {
+    for (std::uint64_t i = random() % 40; i > 0; --i) {
       const std::uint64_t length = 1 + random() % (random() % 4 == 0 ? 20'000 : 200);
       const std::uint64_t at = random() % (damaged.size() - length);
       const auto begin = damaged.begin() + static_cast<std::ptrdiff_t>(at);
