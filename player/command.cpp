@@ -23,6 +23,10 @@ int report(const Error& error) {
   }
 }
 
+int report_in(const std::string& file, const Error& error) {
+  return report({error.code, file + ": " + error.message});
+}
+
 void add_source_options(CLI::App& command, SourceArguments& arguments, const std::string& help) {
   command.add_option("source", arguments.name, help)->required();
   command

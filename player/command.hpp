@@ -27,6 +27,8 @@ enum ExitStatus : int {
 
 /// Prints the error and returns the exit status it means.
 int report(const Error& error);
+/// The same, with the name of the file it is about in front.
+int report_in(const std::string& file, const Error& error);
 
 /// SRC and --http-header.
 struct SourceArguments {
@@ -76,5 +78,7 @@ Command add_validate(CLI::App& app);
 Command add_recover(CLI::App& app);
 Command add_remux(CLI::App& app);
 Command add_concat(CLI::App& app);
+Command add_export(CLI::App& app);
+Command add_import(CLI::App& app);
 
 }  // namespace relit::player
