@@ -455,6 +455,9 @@ Status Reader::learn_layout() {
     return {};
   }
   end_ = *end;
+  segments_end_ = end->file_bytes - record_bytes(kEndPayloadBytes);
+  if (end->index_offset != 0) segments_end_ = end->index_offset;
+  if (end->copies_offset != 0) segments_end_ = end->copies_offset;
   if (end->copies_offset != 0 && end->index_offset > end->copies_offset)
     static_end_ = kSignature.size() + (end->index_offset - end->copies_offset);
   return {};

@@ -125,6 +125,7 @@ class Reader {
   void announce();
   [[nodiscard]] std::uint64_t wanted_run() const;
   [[nodiscard]] bool is_wanted(std::uint32_t track_id) const;
+  [[nodiscard]] std::uint64_t behind_segments(std::uint64_t begin) const;
   void pass_copies(std::uint64_t offset);
   Result<std::optional<Record>> next_record();
   Result<std::optional<RecordHeader>> peek_known();
@@ -155,6 +156,7 @@ class Reader {
   std::uint64_t static_bytes_ = 0;
   std::optional<EndRecord> end_;       ///< read beforehand, where that spares bytes
   std::uint64_t static_end_ = 0;       ///< where the first segment is expected; 0: unknown
+  std::uint64_t segments_end_ = 0;     ///< known where end_ is
   std::uint64_t announced_end_ = 0;    ///< what the source was told to expect
   std::uint64_t segment_guess_ = 512;  ///< the next segment's record and first wanted chunks
   std::uint64_t index_offset_ = 0;     ///< 0: not seen

@@ -25,6 +25,14 @@ std::uint64_t Reader::wanted_run() const {
   return end;
 }
 
+/// What will be read from `begin` on, which nothing but copies, index and end follows.
+std::uint64_t Reader::behind_segments(std::uint64_t begin) const {
+  if (begin < segments_end_) return segments_end_;
+  const bool passes_copies =
+      begin == end_->copies_offset && end_->index_offset > begin + RecordInput::kLeastSeekBytes;
+  return passes_copies ? begin + kRecordHeaderBytes : end_->file_bytes;
+}
+
 /// Tells the source what is wanted from the next record on.
 void Reader::announce() {
   if (!options_.sparing) return;
@@ -40,11 +48,7 @@ void Reader::announce() {
   } else {
     return;  // nothing is known, and the source finds its own steps
   }
-  // Of the copies only the first header is read, and what follows them is short.
-  const std::uint64_t copies = end_ ? end_->copies_offset : 0;
-  if (copies != 0 && announced_end_ > copies)
-    announced_end_ =
-        begin <= copies ? std::max(copies, begin + kRecordHeaderBytes) : end_->file_bytes;
+  if (end_ && announced_end_ > segments_end_) announced_end_ = behind_segments(begin);
   input_.expect(begin, announced_end_);
 }
 

@@ -114,7 +114,7 @@ PlaybackLoss ClipReader::loss() const {
 void ClipReader::note_arrival(std::uint32_t track_id) {
   // Chunks come in the order that the segment lists: after the last one it need not be waited for.
   if (track_id == last_chunk_) complete_end_ = segment_->first_frame + segment_->frame_count;
-  if (impatient_) std::erase(first_picture_, track_id);
+  std::erase(missing_, track_id);
 }
 
 Status ClipReader::take(container::Record record) {
@@ -136,6 +136,7 @@ Status ClipReader::take(container::Record record) {
       return {};
     }
     segment_ = std::move(*segment);
+    missing_ = first_picture_;
     for (const auto& chunk : segment_->chunks) {
       if (std::binary_search(tracks_.begin(), tracks_.end(), chunk.track_id))
         last_chunk_ = chunk.track_id;
@@ -161,7 +162,7 @@ Status ClipReader::read_until(std::uint64_t index) {
   wanted_frame_ = index;
   while (!ended_ && complete_end_ <= index) {
     const bool enough = segment_ && index < segment_->first_frame + segment_->frame_count &&
-                        impatient_ && first_picture_.empty();
+                        impatient_ && missing_.empty();
     if (enough) break;
     auto record = reader_.next();
     if (record && *record) {
@@ -219,7 +220,7 @@ Status ClipReader::decode(std::uint64_t index) {
   RELIT_TRY(poses_->sample(static_cast<double>(index), scratch_.pose));
   if (!planes_) return {};
   Status decoded = planes_->frame(index, scratch_.planes);
-  const bool early = std::exchange(impatient_, false) && first_picture_.empty();
+  const bool early = std::exchange(impatient_, false) && missing_.empty();
   if (!decoded && decoded.error().code == ErrorCode::kNotFound && early) return {};
   return decoded;
 }

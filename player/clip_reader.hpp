@@ -119,7 +119,8 @@ class ClipReader {
   std::optional<container::SegmentRecord> segment_;  ///< whose chunks are coming in
   std::uint32_t last_chunk_ = 0;                     ///< track of the last one that is wanted
   std::uint64_t wanted_frame_ = 0;                   ///< that read_until() is on its way to
-  std::vector<std::uint32_t> first_picture_;         ///< tracks that the first one still waits for
+  std::vector<std::uint32_t> first_picture_;         ///< tracks that an impatient first frame needs
+  std::vector<std::uint32_t> missing_;               ///< those of them that the segment still lacks
   bool impatient_ = false;                           ///< until the first frame has been shown
   std::uint64_t complete_end_ = 0;                   ///< frames before this one have come
   std::uint64_t kept_begin_ = 0;                     ///< frames before this one have been forgotten

@@ -2,6 +2,7 @@
 #include <filesystem>
 
 #include "player/command.hpp"
+#include "player/http_source.hpp"
 #include "player/window.hpp"
 
 namespace relit::player {
@@ -36,6 +37,8 @@ int run(const Arguments& arguments) {
   ClipOptions options;
   options.clip = arguments.clip, options.layers = arguments.window.view.layers,
   options.threads = arguments.threads;
+  // What comes over a network is shown as soon as it can be, a disk is waited for.
+  options.impatient = is_http_address(arguments.source.name);
   auto clip = open_clip(arguments.source, options);
   if (!clip) return report(clip.error());
   if (const Status status = play(arguments, *clip); !status) return report(status.error());

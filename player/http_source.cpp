@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cmath>
 #include <string_view>
 #include <thread>
 #include <utility>
@@ -20,7 +21,8 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr std::uint64_t kFirstWindowBytes = 4096;
+/// Signature and header; what comes after them is announced as a rule.
+constexpr std::uint64_t kFirstWindowBytes = 512;
 constexpr std::uint64_t kLargestWindowBytes = std::uint64_t{1} << 20;
 /// Up to here, reading on is cheaper than a new connection; where bytes are spared, the Reader has
 /// already decided what is worth reading through.
@@ -149,38 +151,45 @@ std::uint64_t HttpSource::range_end(std::uint64_t begin) {
   return size_ ? std::min(end, *size_) : end;
 }
 
-Status HttpSource::request(std::uint64_t begin) {
-  disconnect();
-  const bool whole = size_ && !ranges_;
-  end_ = whole ? 0 : range_end(begin);
+/// What libavformat is to do with a request for [begin, end_). The caller frees it.
+AVDictionary* HttpSource::request_settings(std::uint64_t begin) const {
   AVDictionary* settings = nullptr;
   av_dict_set(&settings, "offset", std::to_string(begin).c_str(), 0);
   // An open end would let the server fill every buffer on the way with what is never read.
   if (end_ != 0) av_dict_set(&settings, "end_offset", std::to_string(end_).c_str(), 0);
   av_dict_set(&settings, "protocol_whitelist", "http,https,httpproxy,tcp,tls", 0);
   if (!headers_.empty()) av_dict_set(&settings, "headers", headers_.c_str(), 0);
+  // TCP's own limit, 5 s unless told otherwise, must not be the shorter one: poll_interrupt() ends
+  // what takes too long.
+  const double longest_s = std::max(options_.connect_timeout_s, options_.read_timeout_s) + 1;
+  av_dict_set_int(&settings, "timeout", std::llround(std::min(longest_s, 2000.0) * 1e6), 0);
+  return settings;
+}
+
+Status HttpSource::request(std::uint64_t begin) {
+  disconnect();
+  const bool whole = size_ && !ranges_;
+  end_ = whole ? 0 : range_end(begin);
+  AVDictionary* settings = request_settings(begin);
   const AVIOInterruptCB interrupt{&poll_interrupt, this};
   arm(options_.connect_timeout_s);
   ++done_.requests;
   const int code = avio_open2(&context_, address_.c_str(), AVIO_FLAG_READ, &interrupt, &settings);
   av_dict_free(&settings);
-  if (code == AVERROR(EPERM) && begin != 0) {
-    auto failure = failed("cannot go on " + at_byte(begin), code, 0);
-    retryable_ = false;
-    failure.error.message =
-        address_ + ": cannot go on " + at_byte(begin) +
-        ": the server sends the file from its beginning instead of the range asked for";
-    return failure;
-  }
-  if (code == AVERROR(EIO))
-    return failed("no answer " + at_byte(begin) +
-                      " (more than 8 redirects, or the connection closed before it)",
-                  code, 0);
-  if (code < 0)
-    return failed(begin == 0 ? "cannot be opened" : "cannot go on " + at_byte(begin), code,
-                  options_.connect_timeout_s);
+  if (code < 0) return refused(begin, code);
   at_ = begin;
   return check_answer(begin);
+}
+
+Unexpected HttpSource::refused(std::uint64_t begin, int code) {
+  std::string doing = begin == 0 ? "cannot be opened" : "cannot go on " + at_byte(begin);
+  // So libavformat says that an answer begins elsewhere than was asked.
+  const bool elsewhere = code == AVERROR(EPERM) && begin != 0;
+  if (elsewhere) doing += ": the server sends the file from its beginning, not the range asked for";
+  if (code == AVERROR(EIO)) doing += ": no answer, or more than 8 redirects";
+  auto failure = failed(doing, code, options_.connect_timeout_s);
+  if (elsewhere) retryable_ = false;
+  return failure;
 }
 
 Status HttpSource::check_answer(std::uint64_t begin) {
@@ -240,6 +249,8 @@ Status HttpSource::reach_position() {
 Result<std::size_t> HttpSource::receive(std::span<std::uint8_t> out) {
   auto wanted = std::min<std::uint64_t>(out.size(), kLargestWindowBytes);
   if (end_ != 0) wanted = std::min(wanted, end_ - at_);
+  // libavformat hands on what a server sends beyond the length it announced.
+  if (size_) wanted = std::min(wanted, *size_ - at_);
   arm(options_.read_timeout_s);
   const int got = avio_read_partial(context_, out.data(), static_cast<int>(wanted));
   if (got > 0) {

@@ -12,6 +12,7 @@
 #include "container/byte_source.hpp"
 #include "player/source.hpp"
 
+struct AVDictionary;
 struct AVIOContext;
 
 namespace relit::player {
@@ -66,7 +67,9 @@ class HttpSource final : public container::ByteSource {
   void arm(double timeout_s);
   Status set_headers();
   Status first_request();
+  [[nodiscard]] AVDictionary* request_settings(std::uint64_t begin) const;
   Status request(std::uint64_t begin);
+  [[nodiscard]] Unexpected refused(std::uint64_t begin, int code);
   Status check_answer(std::uint64_t begin);
   Status reach_position();
   Status try_again(Error failure, std::optional<Retry>& retry);

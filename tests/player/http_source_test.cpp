@@ -432,7 +432,7 @@ TEST_CASE("http: commands take headers and warn") {
 }
 
 // Run by tests/player/nginx_stream.sh, which sets the address.
-TEST_CASE("http: traffic of a stream", "[.nginx]") {
+TEST_CASE("nginx: traffic of a stream", "[.nginx]") {
   const char* address = std::getenv("RELIT_STREAM");
   REQUIRE(address != nullptr);
   const auto static_bytes = layout_of(read_bytes(shipped_clip()), 0).static_bytes;
