@@ -122,12 +122,12 @@ class StreamDecoder {
       return fail(ErrorCode::kCorrupt, what + ": occurs too often");
     }
     RELIT_TRY(check_range(stream.offset, stream.scale, info.dimensions, 0.0f, 65535.0f, what));
-    RELIT_ASSIGN(const std::vector<std::uint8_t> bytes,
+    RELIT_ASSIGN(std::vector<std::uint8_t> bytes,
                  decode_vertex_bytes(stream.bytes, count_, stream.stride, what));
-    return store(stream, bytes);
+    return store(stream, std::move(bytes));
   }
 
-  Status store(const VertexStream& stream, const std::vector<std::uint8_t>& bytes) {
+  Status store(const VertexStream& stream, std::vector<std::uint8_t> bytes) {
     switch (stream.semantic) {
       case Semantic::kPosition:
         store_positions(stream, bytes);
@@ -152,7 +152,7 @@ class StreamDecoder {
       case Semantic::kJoints:
         return store_joints(bytes);
       case Semantic::kWeights:
-        weights_.push_back(bytes);
+        weights_.push_back(std::move(bytes));
         break;
     }
     return {};

@@ -49,7 +49,7 @@ ffmpeg::Codec open_encoder(const std::string& codec) {
   context->level = codec == "ffv1" ? 3 : context->level;
   context->slices = codec == "ffv1" ? 1 : 0;
   context->thread_count = 1;
-  context->flags |= AV_CODEC_FLAG_GLOBAL_HEADER | AV_CODEC_FLAG_BITEXACT | AV_CODEC_FLAG_CLOSED_GOP;
+  context->flags |= AV_CODEC_FLAG_GLOBAL_HEADER | AV_CODEC_FLAG_BITEXACT;
   must(avcodec_open2(context.get(), encoder, nullptr) == 0, "the encoder does not open");
   return context;
 }

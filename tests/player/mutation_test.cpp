@@ -42,6 +42,12 @@ bool is_finite(const decoders::Pose& pose) {
   return true;
 }
 
+std::size_t planes_of(const ClipReader& clip) {
+  std::size_t planes = 0;
+  for (const auto& layer : clip.layers()) planes += layer.planes.size();
+  return planes;
+}
+
 struct Outcome {
   bool opened = false;
   int frames = 0;  ///< that could be shown
@@ -70,7 +76,8 @@ Outcome play(std::unique_ptr<container::ByteSource> source) {
     if (!status) refuse(outcome, status.error());
     if (!status) continue;
     ++outcome.frames;
-    const bool sizes = frame.planes.planes().size() == 1 && frame.pose.palette.size() <= 65535;
+    const bool sizes = frame.planes.planes().size() == planes_of(*clip) &&
+                       frame.pose.palette.size() == clip->contents().skeleton.palette.size();
     if (!sizes || !is_finite(frame.pose)) throw std::runtime_error("a frame of wrong numbers");
   }
   return outcome;
