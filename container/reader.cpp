@@ -147,8 +147,7 @@ Result<std::optional<RecordHeader>> Reader::peek_known() {
       continue;
     }
     if (segment_ || finished_) return *peeked;  // for check_place() to refuse
-    if (copy && order < kSegmentOrder && order_ == kSegmentOrder && copies_offset_ == 0)
-      copies_offset_ = offset;
+    if (copy && order < kSegmentOrder && copies_offset_ == 0) copies_offset_ = offset;
     if (options_.on_passed_over) options_.on_passed_over(header, offset);
     input_.skip();
   }
@@ -193,6 +192,8 @@ Result<std::optional<Record>> Reader::next_record() {
     return failure;
   }
   order_ = order_of(header->type);
+  // Copies in a stream do not count: those of the end stand behind everything else.
+  if (order_ <= kSegmentOrder) copies_offset_ = 0;
   if (header->type == types::kIndex) index_offset_ = offset;
   if (header->type == types::kChunk) ++chunk_;
 
@@ -299,6 +300,7 @@ void Reader::enter_segments() {
   segment_.reset();
   sought_.reset();
   order_ = kSegmentOrder;
+  copies_offset_ = 0;
   jumped_ = true;
   finished_ = false;
 }

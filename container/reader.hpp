@@ -141,7 +141,7 @@ class Reader {
   std::optional<std::vector<std::uint32_t>> wanted_;  ///< sorted
   std::uint64_t static_bytes_ = 0;
   std::uint64_t index_offset_ = 0;   ///< 0: not seen
-  std::uint64_t copies_offset_ = 0;  ///< of the first copy behind a segment; 0: not seen
+  std::uint64_t copies_offset_ = 0;  ///< of the first copy since the last other record; 0: none
   bool jumped_ = false;              ///< by seek or resync: what was not seen may be there
   bool finished_ = false;
   std::optional<Error> fatal_;

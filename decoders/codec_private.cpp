@@ -153,6 +153,11 @@ Result<Bytes> stored_private(std::string_view codec, std::span<const std::uint8_
     const std::vector<Unit> sets = split_annex_b(extradata);
     return codec == "hevc" ? make_hvcc(sets) : make_avcc(sets);
   }
+  if (codec == "hevc") {
+    // Others say of the arrays that more may follow in the packets.
+    RELIT_ASSIGN(const std::vector<Unit> sets, split_hvcc(extradata));
+    return make_hvcc(sets);
+  }
   RELIT_TRY(check_private(codec, extradata));
   return Bytes(extradata.begin(), extradata.end());
 }

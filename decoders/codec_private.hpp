@@ -17,7 +17,8 @@ using Bytes = std::vector<std::uint8_t>;
 /// An encoder's extradata -> codec_private: parameter sets with start codes become an
 /// AVCDecoderConfigurationRecord (h264) or HEVCDecoderConfigurationRecord (hevc), a sequence header
 /// OBU an AV1CodecConfigurationRecord (av1), vp9's becomes empty, everything else is copied. What
-/// has the stored form already is copied too. Errors: kCorrupt when `extradata` has neither form.
+/// has the stored form already is copied too, but for hevc, whose record is made anew, so that
+/// array_completeness is 1. Errors: kCorrupt when `extradata` has neither form.
 [[nodiscard]] Result<Bytes> stored_private(std::string_view codec,
                                            std::span<const std::uint8_t> extradata);
 

@@ -3,36 +3,16 @@
 
 #include <algorithm>
 
+#include "player/video_tracks.hpp"
+
 namespace relit::player {
-namespace {
-
-// A number that is not a clip's name counts clips.
-const container::ClipRecord* find_clip(const std::vector<container::ClipRecord>& clips,
-                                       const std::string& wanted) {
-  if (wanted.empty()) return &clips.front();
-  for (const container::ClipRecord& clip : clips) {
-    if (clip.name == wanted) return &clip;
-  }
-  if (wanted.size() > 6 || wanted.find_first_not_of("0123456789") != std::string::npos)
-    return nullptr;
-  const auto number = static_cast<std::size_t>(std::stoul(wanted));
-  return number < clips.size() ? &clips[number] : nullptr;
-}
-
-}  // namespace
 
 Unexpected ClipReader::in_file(const Error& error) const {
   return fail(error.code, name_ + ": " + error.message);
 }
 
 Status ClipReader::choose_clip(const std::string& wanted) {
-  const container::ClipRecord* clip = find_clip(contents_.clips, wanted);
-  if (clip == nullptr) {
-    std::string names;
-    for (const container::ClipRecord& c : contents_.clips)
-      names += (names.empty() ? "" : ", ") + c.name;
-    return fail(ErrorCode::kNotFound, name_ + ": no clip \"" + wanted + "\"; there are: " + names);
-  }
+  RELIT_ASSIGN(const container::ClipRecord* clip, find_clip(contents_, wanted, name_));
   clip_ = *clip;
   timeline_ = container::Timeline(clip_);
   const auto model =

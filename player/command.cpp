@@ -24,6 +24,10 @@ int report(const Error& error) {
   }
 }
 
+int report_in(const std::string& file, const Error& error) {
+  return report({error.code, file + ": " + error.message});
+}
+
 Result<ClipReader> open_clip(const std::string& source, const ClipOptions& options) {
   RELIT_ASSIGN(auto bytes, open_source(source));
   return ClipReader::open(std::move(bytes), source == "-" ? "standard input" : source, options);

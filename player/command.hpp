@@ -26,6 +26,8 @@ enum ExitStatus : int {
 
 /// Prints the error and returns the exit status it means.
 int report(const Error& error);
+/// The same, with the name of the file it is about in front.
+int report_in(const std::string& file, const Error& error);
 
 /// Opens a clip as the user named it.
 [[nodiscard]] Result<ClipReader> open_clip(const std::string& source, const ClipOptions& options);
@@ -61,6 +63,11 @@ Command add_dump(CLI::App& app);
 Command add_light(CLI::App& app);
 Command add_render(CLI::App& app);
 Command add_play(CLI::App& app);
+<<<<<<< HEAD
 Command add_validate(CLI::App& app);
+=======
+Command add_export(CLI::App& app);
+Command add_import(CLI::App& app);
+>>>>>>> codec
 
 }  // namespace relit::player

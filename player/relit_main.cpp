@@ -21,12 +21,14 @@ int main(int argc, char** argv) {
     const char* name;
     Command run;
   };
-  const std::array<Entry, 6> commands{{{"info", add_info(app)},
+  const std::array<Entry, 8> commands{{{"info", add_info(app)},
                                        {"dump", add_dump(app)},
                                        {"light", add_light(app)},
                                        {"render", add_render(app)},
                                        {"play", add_play(app)},
-                                       {"validate", add_validate(app)}}};
+                                       {"validate", add_validate(app)},
+                                       {"export", add_export(app)},
+                                       {"import", add_import(app)}}};
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

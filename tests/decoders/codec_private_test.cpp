@@ -140,7 +140,7 @@ TEST_CASE("HEVC packets keep their slices, after their lengths, and nothing else
 
 TEST_CASE("AV1 packets lose their delimiters and gain sizes") {
   const Bytes delimiter = {0x12, 0x00}, frame = {0x32, 0x02, 0xab, 0xcd};
-  const auto stored = stored_packet("av1", join({delimiter, frame, {0x34, 0x08, 0x01, 0x02}}));
+  const auto stored = stored_packet("av1", join({delimiter, frame, {0x36, 0x08, 0x05, 0x02}}));
   // Type 6 with an extension and size, but of more bytes than there are.
   CHECK(!stored);
   const auto open = stored_packet("av1", join({delimiter, frame, {0x30, 0x05}}));
@@ -183,6 +183,36 @@ TEST_CASE("H.264 parameter sets become a configuration record, and say how many 
   const auto lossless = parse_h264_sps(h264_sps(244, 3, 8, 2));
   REQUIRE(lossless);
   CHECK(lossless->chroma_format == 3);
+}
+
+TEST_CASE("HEVC parameter sets become a configuration record, whoever wrote the first one") {
+  const Bytes vps = {0x40, 1, 0x0c}, pps = {0x44, 1, 0xc1};
+  BitWriter w;
+  // Two temporal layers, the lower with profile and level of its own; 4:4:4 of ten bits.
+  w.bits(16, 0x4201).bits(4, 0).bits(3, 1).bits(1, 1);
+  w.bits(8, 0x24).bits(32, 0x08000000).bits(32, 0x9d080000).bits(16, 0).bits(8, 93);
+  w.bits(2, 3).bits(14, 0).bits(32, 0).bits(32, 0).bits(24, 0).bits(8, 90);
+  w.golomb(0).golomb(3).bits(1, 0).golomb(64).golomb(48).bits(1, 0).golomb(2).golomb(2).golomb(4);
+  w.bits(1, 1).golomb(2).golomb(1).golomb(0).golomb(4).golomb(2).golomb(0);
+  const Bytes sps = w.unit();
+  const auto record = stored_private("hevc", join({kLong, vps, kLong, sps, kShort, pps}));
+  REQUIRE(record);
+  const auto length = static_cast<std::uint8_t>(sps.size());
+  CHECK(*record == join({{1, 0x24, 8, 0, 0, 0, 0x9d, 8, 0, 0, 0, 0, 93, 0xf0, 0, 0xfc},
+                         {0xff, 0xfa, 0xfa, 0, 0, (2 << 3) | 4 | 3, 3},
+                         {0xa0, 0, 1, 0, 3},
+                         vps,
+                         {0xa1, 0, 1, 0, length},
+                         sps,
+                         {0xa2, 0, 1, 0, 3},
+                         pps}));
+  CHECK(*decoder_pictures("hevc", *record) == 5);
+  Bytes incomplete = *record;
+  incomplete[23] = 0x20;
+  CHECK(*stored_private("hevc", incomplete) == *record);
+  for (std::size_t size = 0; size < record->size(); ++size) {
+    CHECK(!check_private("hevc", std::span(*record).first(size)));
+  }
 }
 
 TEST_CASE("headers without what a decoder needs are refused") {
