@@ -63,11 +63,8 @@ Command add_dump(CLI::App& app);
 Command add_light(CLI::App& app);
 Command add_render(CLI::App& app);
 Command add_play(CLI::App& app);
-<<<<<<< HEAD
 Command add_validate(CLI::App& app);
-=======
 Command add_export(CLI::App& app);
 Command add_import(CLI::App& app);
->>>>>>> codec
 
 }  // namespace relit::player
