@@ -214,6 +214,8 @@ Result<std::optional<Record>> Reader::next_record() {
     return failure;
   }
   order_ = order_of(header->type);
+  // Copies in a stream do not count: those of the end stand behind everything else.
+  if (order_ <= kSegmentOrder) copies_offset_ = 0;
   if (header->type == types::kIndex) index_offset_ = offset;
   if (header->type == types::kChunk) ++chunk_;
 
@@ -325,6 +327,7 @@ void Reader::enter_segments() {
   sought_.reset();
   order_ = kSegmentOrder;
   announced_end_ = 0;
+  copies_offset_ = 0;
   jumped_ = true;
   finished_ = false;
 }

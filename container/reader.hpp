@@ -160,7 +160,7 @@ class Reader {
   std::uint64_t announced_end_ = 0;    ///< what the source was told to expect
   std::uint64_t segment_guess_ = 512;  ///< the next segment's record and first wanted chunks
   std::uint64_t index_offset_ = 0;     ///< 0: not seen
-  std::uint64_t copies_offset_ = 0;    ///< of the first copy behind the last segment; 0: not seen
+  std::uint64_t copies_offset_ = 0;    ///< of the first copy since the last other record
   bool jumped_ = false;                ///< by seek or resync: what was not seen may be there
   bool finished_ = false;
   std::optional<Error> fatal_;

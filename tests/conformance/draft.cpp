@@ -39,18 +39,18 @@ void add_segment(std::vector<Piece>& pieces, const DraftSegment& segment) {
 struct Places {
   IndexRecord index;
   EndRecord end;
-  bool segments_begun = false;
 
   void note(const Piece& piece, std::uint64_t offset) {
     if (piece.type == types::kSegment) {
-      segments_begun = true;
       const auto segment = parse_segment(piece.payload);
       if (segment)
         index.segments.push_back({segment->index, segment->clip_id, segment->first_frame,
                                   segment->frame_count, offset, segment->first_tick});
     }
-    const bool copy = (piece.flags & flags::kCopy) != 0 && is_static(piece.type);
-    if (copy && segments_begun && end.copies_offset == 0) end.copies_offset = offset;
+    const bool copy = (piece.flags & flags::kCopy) != 0;
+    if (is_static(piece.type) && copy && end.copies_offset == 0) end.copies_offset = offset;
+    // Only those behind the last segment, or behind the static part of a file without any, count.
+    if ((is_static(piece.type) && !copy) || piece.type == types::kSegment) end.copies_offset = 0;
     if (piece.type == types::kIndex && (piece.flags & flags::kCopy) == 0) end.index_offset = offset;
   }
 };

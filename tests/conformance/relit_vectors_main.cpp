@@ -3,16 +3,17 @@
 #include <meshoptimizer.h>
 #include <zstd.h>
 
-extern "C" {
-#include <libavutil/avutil.h>
-}
-
+#include <cstdint>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
 #include <fstream>
 #include <set>
 #include <stdexcept>
+
+extern "C" {
+#include <libavutil/avutil.h>
+}
 
 #include "player/file_survey.hpp"
 #include "tests/conformance/frames.hpp"

@@ -48,7 +48,7 @@ void add_meshes(Vectors& vectors) {
   mesh(vectors, "mesh-stream-behind", "bytes behind a stream's end",
        [](M& m) { m.streams[0].bytes.push_back(0); });
   mesh(vectors, "mesh-vertices-other", "a stream of another number of vertices",
-       [](M& m) { m.vertex_count = 40; });
+       [](M& m) { m.vertex_count = 300; });
   mesh(vectors, "mesh-indices-other", "a stream of another number of indices",
        [](M& m) { m.index_count = 9; });
   mesh(vectors, "mesh-index-beyond", "an index beyond the vertices", [](M& m) {
@@ -173,8 +173,12 @@ void add_video(Vectors& vectors) {
              noted({"VIDEO_TRANSFER"}), [](Draft& d) {
                d.models[0].mean[0] = {3, 3, 3};
              });
-  from_draft(vectors, "picture-other-size", "pictures of another size than promised",
-             faulty({"VIDEO_PICTURE"}), [](Draft& d) { d.layers[0].coded_height = 32; });
+  FigureOptions mpeg4 = plain_figure();
+  mpeg4.coding.codec = "mpeg4";
+  mpeg4.coding.chroma = Chroma::k420;
+  from_draft(
+      vectors, "picture-other-size", "pictures of another size than promised",
+      faulty({"VIDEO_PICTURE"}), [](Draft& d) { d.layers[0].coded_height = 32; }, mpeg4);
   from_draft(vectors, "picture-repeated", "frames without a packet repeat the one before", whole(),
              [](Draft& d) {
                ChunkRecord& chunk = d.segments[0].chunks[1];

@@ -41,7 +41,7 @@ void add_payload_checksums(Vectors& vectors) {
              faulty({"FRAMING_PAYLOAD_CRC"}),
              [](Bytes& b) { b.at(offset_of(b, types::kClip, 1) + kPayload + 1) ^= 1; });
   add(vectors, "payload-crc-no-copy", "a bit of CLIP is wrong, and there are no copies",
-      refused({"FRAMING_PAYLOAD_CRC"}), [] {
+      refused({"FRAMING_PAYLOAD_CRC", "COPY_MISSING"}), [] {
         Draft draft = figure();
         draft.copies = false;
         Bytes b = assemble(draft);
@@ -71,8 +71,8 @@ void add_headers(Vectors& vectors) {
              refused({"FRAMING_HEADER_CRC"}), hit(types::kHeader));
   from_bytes(vectors, "padding", "a byte of padding is not zero", lossy({"FRAMING_PADDING"}),
              [](Bytes& b) {
-               // Behind the pose chunk, whose length is no multiple of 8.
-               const std::size_t at = offset_of(b, types::kChunk, 1);
+               // Behind a chunk whose length is no multiple of 8.
+               const std::size_t at = offset_of(b, types::kSegment, 1);
                b.at(at - 1) = 1;
              });
   from_bytes(vectors, "type-reserved", "a type whose third letter is lower case",
@@ -116,29 +116,33 @@ void add_truncations(Vectors& vectors) {
              refused({"FRAMING_SIGNATURE"}), [](Bytes& b) { b.erase(b.begin() + 4); });
   from_bytes(vectors, "cut-signature", "ends inside the signature", refused({"FRAMING_SIGNATURE"}),
              [](Bytes& b) { cut(b, 5); });
-  from_bytes(vectors, "cut-behind-signature", "ends behind the signature", refused({"ORDER_HEAD"}),
-             [](Bytes& b) { cut(b, 8); });
-  from_bytes(vectors, "cut-head", "ends inside HEAD", refused({"FRAMING_TRUNCATED"}),
-             [](Bytes& b) { cut(b, 40); });
+  from_bytes(vectors, "cut-behind-signature", "ends behind the signature",
+             refused({"ORDER_NO_CLIP", "FEND_MISSING"}), [](Bytes& b) { cut(b, 8); });
+  from_bytes(vectors, "cut-head", "ends inside HEAD",
+             refused({"FRAMING_TRUNCATED", "FEND_MISSING"}), [](Bytes& b) { cut(b, 40); });
   from_bytes(vectors, "cut-static-header", "ends inside the header of MESH",
-             refused({"FRAMING_TRUNCATED"}),
+             refused({"FRAMING_TRUNCATED", "FEND_MISSING"}),
              [](Bytes& b) { cut(b, offset_of(b, types::kMesh) + 11); });
-  from_bytes(vectors, "cut-static-payload", "ends inside MESH", refused({"FRAMING_TRUNCATED"}),
+  from_bytes(vectors, "cut-static-payload", "ends inside MESH",
+             refused({"FRAMING_TRUNCATED", "FEND_MISSING"}),
              [](Bytes& b) { cut(b, offset_of(b, types::kMesh) + 50); });
-  from_bytes(vectors, "cut-behind-head", "ends behind HEAD", refused({"ORDER_NO_CLIP"}),
+  from_bytes(vectors, "cut-behind-head", "ends behind HEAD",
+             refused({"ORDER_NO_CLIP", "FEND_MISSING"}),
              [](Bytes& b) { cut(b, offset_of(b, types::kClip)); });
-  from_bytes(vectors, "cut-segment", "ends inside SEGM", lossy({"FRAMING_TRUNCATED"}),
+  from_bytes(vectors, "cut-segment", "ends inside SEGM",
+             lossy({"FRAMING_TRUNCATED", "FEND_MISSING"}),
              [](Bytes& b) { cut(b, offset_of(b, types::kSegment, 1) + 60); });
-  from_bytes(vectors, "cut-chunk", "ends inside a chunk", lossy({"FRAMING_TRUNCATED"}),
+  from_bytes(vectors, "cut-chunk", "ends inside a chunk",
+             lossy({"FRAMING_TRUNCATED", "FEND_MISSING"}),
              [](Bytes& b) { cut(b, offset_of(b, types::kChunk, 1) + 60); });
   from_bytes(vectors, "cut-between-chunks", "ends between two chunks of a segment",
-             lossy({"FRAMING_TRUNCATED"}),
+             lossy({"FRAMING_TRUNCATED", "FEND_MISSING"}),
              [](Bytes& b) { cut(b, offset_of(b, types::kChunk, 1)); });
   from_bytes(vectors, "cut-between-segments", "ends behind a segment: half a clip",
              noted({"FEND_MISSING"}), [](Bytes& b) { cut(b, offset_of(b, types::kSegment, 1)); });
   from_bytes(vectors, "cut-before-end", "FEND is missing, as in a live stream",
              noted({"FEND_MISSING"}), [](Bytes& b) { cut(b, offset_of(b, types::kEnd)); });
-  from_bytes(vectors, "cut-end", "ends inside FEND", lossy({"FRAMING_TRUNCATED"}),
+  from_bytes(vectors, "cut-end", "ends inside FEND", lossy({"FRAMING_TRUNCATED", "FEND_MISSING"}),
              [](Bytes& b) { cut(b, b.size() - 8); });
   from_bytes(vectors, "behind-end", "a record behind FEND", lossy({"ORDER_BEHIND_END"}),
              [](Bytes& b) {
@@ -151,13 +155,17 @@ void add_truncations(Vectors& vectors) {
 
 void add_lost_framing(Vectors& vectors) {
   from_bytes(vectors, "bytes-lost", "sixteen bytes of a chunk are gone: the next segment is found",
-             lossy({"FRAMING_PAYLOAD_CRC"}), [](Bytes& b) {
+             lossy({"FRAMING_PAYLOAD_CRC", "FRAMING_HEADER_CRC", "INDX_ENTRY", "INDX_SEGMENT",
+                    "FEND_INDEX_OFFSET", "FEND_FILE_BYTES"}),
+             [](Bytes& b) {
                const auto at =
                    b.begin() + static_cast<std::ptrdiff_t>(offset_of(b, types::kChunk, 1) + 40);
                b.erase(at, at + 16);
              });
   from_bytes(vectors, "bytes-added", "sixteen bytes too many in a chunk",
-             lossy({"FRAMING_PAYLOAD_CRC"}), [](Bytes& b) {
+             lossy({"FRAMING_PAYLOAD_CRC", "FRAMING_HEADER_CRC", "INDX_SEGMENT",
+                    "FEND_INDEX_OFFSET", "FEND_FILE_BYTES"}),
+             [](Bytes& b) {
                const auto at =
                    b.begin() + static_cast<std::ptrdiff_t>(offset_of(b, types::kChunk, 1) + 40);
                b.insert(at, 16, 0xAA);
@@ -208,7 +216,7 @@ void add_unknown(Vectors& vectors) {
               noted({"FRAMING_UNDEFINED_FLAG"}),
               [](std::vector<Piece>& p) { p[find_piece(p, types::kSkeleton)].flags = 1u << 20; });
   from_pieces(vectors, "flag-critical", "an undefined critical flag on a critical record",
-              refused({"FRAMING_CRITICAL_FLAG"}),
+              refused({"FRAMING_CRITICAL_FLAG", "COPY_WITHOUT_ORIGINAL", "COPY_ORDER"}),
               [](std::vector<Piece>& p) { p[find_piece(p, types::kModel)].flags = 1u << 3; });
   from_pieces(vectors, "flag-critical-on-ancillary",
               "an undefined critical flag on an unknown ancillary record",

@@ -9,9 +9,11 @@ using namespace container;
 
 namespace {
 
+/// `consequence`: what else shows when the contents are decoded all the same.
 void broken(Vectors& vectors, const char* name, const char* description,
-            std::function<void(Draft&)> change) {
+            std::function<void(Draft&)> change, const char* consequence = nullptr) {
   from_static_draft(vectors, name, description, "REF_INVALID", std::move(change));
+  if (consequence != nullptr) vectors.back().findings.push_back(consequence);
 }
 
 void add_ids(Vectors& vectors) {
@@ -54,55 +56,67 @@ void add_dangling(Vectors& vectors) {
          [](Draft& d) { d.models[0].clip_id = 5; });
   broken(vectors, "no-model", "a layer of a model that is not there",
          [](Draft& d) { d.layers[0].model_id = 5; });
-  broken(vectors, "no-node-of-rest", "a rest of a node that is not there",
-         [](Draft& d) { d.poses[0].rest[0].node = 2; });
-  broken(vectors, "no-node-of-channel", "a channel of a node that is not there",
-         [](Draft& d) { d.poses[0].channels[0].index = 2; });
-  broken(vectors, "no-morph-weight", "a channel of a morph weight that is not there",
-         [](Draft& d) { d.poses[0].channels[0].target = ChannelTarget::kMorphWeight; });
-  broken(vectors, "no-mesh", "a range of a mesh that is not there", [](Draft& d) {
-    d.poses[0] = {d.poses[0].track_id, d.poses[0].clip_id, PoseKind::kVertices, {}, {},
-                  {{5, {}, {1, 1, 1}}}};
-  });
-  broken(vectors, "no-palette", "a mesh of joints without a palette",
-         [](Draft& d) { d.skeleton->palette.clear(); });
-  broken(vectors, "no-weights-of-targets", "more morph targets than weights", [](Draft& d) {
-    d.meshes[0].morph_targets = {{{1, 1, 1}, {1}}};
-  });
+  broken(
+      vectors, "no-node-of-rest", "a rest of a node that is not there",
+      [](Draft& d) { d.poses[0].rest[0].node = 2; }, "DECODE_POSE_TRACK");
+  broken(
+      vectors, "no-node-of-channel", "a channel of a node that is not there",
+      [](Draft& d) { d.poses[0].channels[0].index = 2; }, "DECODE_POSE_TRACK");
+  broken(
+      vectors, "no-morph-weight", "a channel of a morph weight that is not there",
+      [](Draft& d) { d.poses[0].channels[0].target = ChannelTarget::kMorphWeight; },
+      "DECODE_POSE_TRACK");
+  broken(
+      vectors, "no-mesh", "a range of a mesh that is not there",
+      [](Draft& d) {
+        d.poses[0] = {d.poses[0].track_id, d.poses[0].clip_id, PoseKind::kVertices, {}, {},
+                      {{5, {}, {1, 1, 1}}}};
+      },
+      "DECODE_POSE_TRACK");
+  broken(
+      vectors, "no-palette", "a mesh of joints without a palette",
+      [](Draft& d) { d.skeleton->palette.clear(); }, "DECODE_MESH");
+  broken(
+      vectors, "no-weights-of-targets", "more morph targets than weights",
+      [](Draft& d) {
+        d.meshes[0].morph_targets = {{{1, 1, 1}, {1}}};
+      },
+      "DECODE_MESH");
   broken(vectors, "plane-size", "a plane that is smaller than its light map",
          [](Draft& d) { d.layers[0].planes[0].mantissa_rect.width = 15; });
   broken(vectors, "matrix-beyond-order", "an entry for a coefficient beyond the model's order",
          [](Draft& d) { d.layers[0].planes[0].matrix[0].coefficient = 1; });
-  broken(vectors, "prediction-beyond-planes", "a prediction from a plane that is not there",
-         [](Draft& d) { d.models[0].prediction_plane = 7; });
+  broken(
+      vectors, "prediction-beyond-planes", "a prediction from a plane that is not there",
+      [](Draft& d) { d.models[0].prediction_plane = 7; }, "MODL_UNSUPPORTED");
   from_static_draft(vectors, "video-samples-limit",
-                    "more samples of video than any machine decodes", "REF_LIMIT", [](Draft& d) {
-                      d.clips[0].frame_count = d.clips[0].duration_ticks = std::uint64_t{1} << 32;
-                      d.layers[0].coded_width = d.layers[0].coded_height = 16384;
-                    });
+                    "more samples of video than any machine decodes", "REF_LIMIT",
+                    [](Draft& d) { d.clips[0].tick_rate.num = 0x7FFFFFFF; });
 }
 
 void add_order(Vectors& vectors) {
   const auto swapped = [](RecordType a, RecordType b) {
     return [a, b](std::vector<Piece>& p) { std::swap(p[find_piece(p, a)], p[find_piece(p, b)]); };
   };
-  from_pieces(vectors, "order-head-second", "CLIP before HEAD", refused({"ORDER_HEAD"}),
+  from_pieces(vectors, "order-head-second", "CLIP before HEAD",
+              refused({"ORDER_HEAD", "ORDER_RECORD", "COPY_ORDER"}),
               swapped(types::kHeader, types::kClip));
-  from_pieces(vectors, "order-mesh-before-material", "MESH before MATL", faulty({"ORDER_RECORD"}),
+  from_pieces(vectors, "order-mesh-before-material", "MESH before MATL", refused({"ORDER_RECORD"}),
               swapped(types::kMaterial, types::kMesh));
-  from_pieces(vectors, "order-two-skeletons", "SKEL twice", faulty({"ORDER_RECORD"}),
+  from_pieces(vectors, "order-two-skeletons", "SKEL twice", faulty({"ORDER_RECORD", "COPY_ORDER"}),
               [](std::vector<Piece>& p) {
                 const std::size_t at = find_piece(p, types::kSkeleton);
                 p.insert(p.begin() + static_cast<std::ptrdiff_t>(at), Piece(p[at]));
               });
-  from_pieces(vectors, "order-late-layer", "LAYR behind a segment", lossy({"ORDER_RECORD"}),
-              [](std::vector<Piece>& p) {
+  from_pieces(vectors, "order-late-layer", "LAYR behind a segment",
+              lossy({"ORDER_RECORD", "COPY_ORDER"}), [](std::vector<Piece>& p) {
                 const Piece layer = p[find_piece(p, types::kLayer)];
                 const std::size_t at = find_piece(p, types::kSegment, 1);
                 p.insert(p.begin() + static_cast<std::ptrdiff_t>(at), layer);
               });
-  from_draft(vectors, "order-no-clip", "a file without clip", refused({"ORDER_NO_CLIP"}),
-             [](Draft& d) { d = Draft(); });
+  from_draft(vectors, "order-no-clip", "a file without clip",
+             refused({"ORDER_NO_CLIP", "FEND_MISSING"}),
+             [](Draft& d) { d = Draft(), d.copies = d.index = d.end = false; });
   from_pieces(vectors, "chunk-stray", "a chunk that no segment announces", lossy({"CHNK_STRAY"}),
               [](std::vector<Piece>& p) {
                 const Piece chunk = p[find_piece(p, types::kChunk)];
@@ -110,7 +124,7 @@ void add_order(Vectors& vectors) {
                 p.insert(p.begin() + static_cast<std::ptrdiff_t>(at), chunk);
               });
   from_pieces(vectors, "chunk-swapped", "chunks in another order than announced",
-              lossy({"CHNK_ANNOUNCED"}), [](std::vector<Piece>& p) {
+              lossy({"CHNK_ANNOUNCED", "CHNK_STRAY"}), [](std::vector<Piece>& p) {
                 std::swap(p[find_piece(p, types::kChunk)], p[find_piece(p, types::kChunk, 1)]);
               });
   from_pieces(vectors, "chunk-missing", "an announced chunk is missing", lossy({"CHNK_ANNOUNCED"}),
@@ -133,10 +147,11 @@ void add_segments(Vectors& vectors) {
              faulty({"SEGM_CLIP", "CLIP_INCOMPLETE"}),
              [](Draft& d) { d.segments[1].record.clip_id = 9; });
   from_draft(vectors, "segment-frames", "frames beyond the end of the clip",
-             faulty({"SEGM_FRAMES", "SEGM_DURATION"}),
+             faulty({"SEGM_FRAMES"}),
              [](Draft& d) { d.clips[0].frame_count = d.clips[0].duration_ticks = 2; });
   from_draft(vectors, "segment-ticks", "a first tick that is not that of the frames before",
-             faulty({"SEGM_TICKS"}), [](Draft& d) { d.segments[1].record.first_tick = 1; });
+             faulty({"SEGM_TICKS", "SEGM_DURATION"}),
+             [](Draft& d) { d.segments[1].record.first_tick = 1; });
   from_draft(vectors, "segment-durations", "durations that do not add up to the clip's",
              faulty({"SEGM_DURATION"}), [](Draft& d) { d.clips[0].duration_ticks = 10; });
   from_draft(vectors, "segment-overlap", "segments that share a frame", faulty({"SEGM_OVERLAP"}),
@@ -147,7 +162,7 @@ void add_segments(Vectors& vectors) {
              });
   from_draft(
       vectors, "segment-gap", "a segment in the middle is missing", noted({"SEGM_GAP"}),
-      [](Draft& d) { d.segments.erase(d.segments.begin() + 1); },
+      [](Draft& d) { d.segments.erase(d.segments.begin() + 1), d.segments[1].record.index = 1; },
       [] {
         FigureOptions o = plain_figure();
         o.frames = 5;
@@ -192,9 +207,10 @@ void add_copies_and_index(Vectors& vectors) {
         p.erase(p.begin() + static_cast<std::ptrdiff_t>(find_piece(p, types::kSkeleton, 1)));
         p.insert(p.begin() + static_cast<std::ptrdiff_t>(find_piece(p, types::kMaterial)), copy);
       });
-  from_pieces(
-      vectors, "copy-different", "a copy that is not what it copies", faulty({"COPY_DIFFERENT"}),
-      [](std::vector<Piece>& p) { p[find_piece(p, types::kSkeleton, 1)].payload[12] ^= 1; });
+  from_pieces(vectors, "copy-different", "a copy that is not what it copies",
+              faulty({"COPY_DIFFERENT", "COPY_ORDER"}), [](std::vector<Piece>& p) {
+                p[find_piece(p, types::kSkeleton, 1)].payload[12] ^= 1;
+              });
   from_pieces(vectors, "copy-order", "copies in another order", noted({"COPY_ORDER"}),
               [](std::vector<Piece>& p) {
                 std::swap(p[find_piece(p, types::kMesh, 1)], p[find_piece(p, types::kSkeleton, 1)]);

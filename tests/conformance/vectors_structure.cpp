@@ -32,7 +32,7 @@ void add_omissions(Vectors& vectors) {
   from_draft(vectors, "live", "neither copies nor INDX nor FEND, as a live stream",
              noted({"FEND_MISSING"}), [](Draft& d) { d.copies = d.index = d.end = false; });
   good(vectors, "without-segments", "still meshes and nothing to play",
-       [](Draft& d) { d.segments.clear(); });
+       [](Draft& d) { d.segments.clear(), d.poses.clear(), d.models.clear(), d.layers.clear(); });
   good(vectors, "clip-alone", "HEAD and CLIP, nothing else", [](Draft& d) {
     Draft bare;
     bare.clips = d.clips;
