@@ -285,7 +285,6 @@ Status Reader::accept_segment(const SegmentRecord& segment) {
   next_segment_index_ = segment.index + 1;
   segment_ = segment;
   chunk_ = 0;
-  copies_offset_ = 0;  // the end speaks of those behind the last segment
   return {};
 }
 

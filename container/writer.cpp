@@ -117,10 +117,10 @@ Status Writer::write_segment(const SegmentInfo& info, std::vector<ChunkRecord> c
       chunk.data = {};
     }
     RELIT_TRY(validate(segment));
-    RELIT_TRY(written->check(segment));
     RELIT_REQUIRE(options_.gaps || segment.first_frame == written->next_frame(),
                   "the segment starts with frame " + std::to_string(segment.first_frame) +
                       ", the next one of its clip is " + std::to_string(written->next_frame()));
+    RELIT_TRY(written->check(segment));
     index_.segments.push_back({segment.index, segment.clip_id, segment.first_frame,
                                segment.frame_count, offset_, segment.first_tick});
     RELIT_TRY(write_record(types::kSegment, serialize(segment)));

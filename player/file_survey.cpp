@@ -27,7 +27,6 @@ void note(FileSurvey& survey, Record record) {
 Result<FileSurvey> survey_file(std::unique_ptr<ByteSource> source, bool packets) {
   FileSurvey survey;
   ReaderOptions options;
-  options.sparing = !packets;
   options.on_passed_over = [&survey](const RecordHeader& header, std::uint64_t offset_bytes) {
     survey.passed_over.push_back({offset_bytes, header});
   };
