@@ -10,6 +10,7 @@
 #include "bake_minimal/parallel.hpp"
 #include "bake_minimal/plane_encoder.hpp"
 #include "bake_minimal/push_pull.hpp"
+#include "bake_minimal/seams.hpp"
 #include "container/byte_sink.hpp"
 #include "container/writer.hpp"
 #include "decoders/npy.hpp"
@@ -45,6 +46,7 @@ class Bake {
  private:
   Status check_outputs() const;
   void summarize();
+  Status find_seams(BakePoser& poser, const TraceGeometry& geometry);
   Status trace();
   Status write();
   Result<RangeScan> scan_range(decoders::NpyWriter* reference);
@@ -68,7 +70,8 @@ class Bake {
   std::optional<FrameStore> store_;                // [coefficients][3][samples] by frame
   std::vector<std::vector<std::uint8_t>> buried_;  // by frame; empty where nothing is
   std::optional<PushPull> push_pull_;              // for frames in which nothing is buried
-  std::vector<float> filled_;                      // [coefficients][3][H][W] of the frame in hand
+  std::optional<SeamStitcher> stitcher_;
+  std::vector<float> filled_;  // [coefficients][3][H][W] of the frame in hand
   glm::vec3 bounds_min_{std::numeric_limits<float>::infinity()};
   glm::vec3 bounds_max_{-std::numeric_limits<float>::infinity()};
 };
@@ -104,11 +107,26 @@ void Bake::summarize() {
   add(scene.warnings), add(prepared_.packed.warnings), add(prepared_.packed.materials.warnings);
 }
 
+// Two moments tell what belongs together from what only touches.
+Status Bake::find_seams(BakePoser& poser, const TraceGeometry& geometry) {
+  RELIT_TRY(poser.pose(prepared_.frames / 2));
+  const std::vector<glm::vec3> positions(poser.positions().begin(), poser.positions().end());
+  const std::vector<glm::vec3> normals(poser.normals().begin(), poser.normals().end());
+  RELIT_TRY(poser.pose(0));
+  const std::vector<Seam> seams =
+      bake::find_seams({geometry.indices, geometry.lightmap_uv, poser.positions(), poser.normals()},
+                       {geometry.indices, geometry.lightmap_uv, positions, normals});
+  stitcher_.emplace(options_.transfer.width, options_.transfer.height, seams, prepared_.samples);
+  return {};
+}
+
 Status Bake::trace() {
   const Stopwatch watch;
-  RELIT_ASSIGN(TransferTracer tracer, TransferTracer::create(trace_geometry(prepared_.packed),
-                                                             prepared_.samples, options_.transfer));
   RELIT_ASSIGN(BakePoser poser, BakePoser::create(prepared_));
+  TraceGeometry geometry = trace_geometry(prepared_.packed);
+  RELIT_TRY(find_seams(poser, geometry));
+  RELIT_ASSIGN(TransferTracer tracer,
+               TransferTracer::create(std::move(geometry), prepared_.samples, options_.transfer));
   RELIT_ASSIGN(store_, FrameStore::create(options_.output.parent_path(), prepared_.frames,
                                           planes() * prepared_.samples.size()));
   buried_.resize(prepared_.frames);
@@ -132,7 +150,7 @@ Status Bake::trace() {
   return {};
 }
 
-// Spreads the samples of a frame over its map and fills the rest.
+// Spreads the samples of a frame over its map, fills the rest and closes the seams.
 void Bake::fill_frame(std::uint64_t frame) {
   const std::vector<std::uint8_t>& buried = buried_[frame];
   std::optional<PushPull> own;
@@ -159,6 +177,7 @@ void Bake::fill_frame(std::uint64_t frame) {
     for (std::size_t s = 0; s < prepared_.samples.size(); ++s)
       out[prepared_.samples[s].texel] = values[plane * prepared_.samples.size() + s];
     push_pull.fill(out);
+    stitcher_->stitch(out);
   });
 }
 

@@ -112,11 +112,13 @@ Status PlaneEncoder::open_layer(LayerState& layer) {
   RELIT_ASSIGN(VideoEncoder mantissas,
                VideoEncoder::open(mantissa_settings(record, scan_.options())));
   record.codec_private = mantissas.codec_private();
+  record.mantissa_pictures = mantissas.decoder_pictures();
   layer.mantissas.emplace(std::move(mantissas));
   layer.mantissa_track.id = record.mantissa_track;
   if (record.has_exponents) {
     RELIT_ASSIGN(VideoEncoder exponents, VideoEncoder::open(exponent_settings(record, scan_)));
     record.exponent_private = exponents.codec_private();
+    record.exponent_pictures = exponents.decoder_pictures();
     layer.exponents.emplace(std::move(exponents));
     layer.exponent_track.id = record.exponent_track;
   }

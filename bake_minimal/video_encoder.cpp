@@ -14,6 +14,8 @@ extern "C" {
 #include <cstring>
 #include <span>
 
+#include "decoders/codec_private.hpp"
+
 namespace relit::bake {
 namespace {
 
@@ -150,33 +152,13 @@ void configure(const VideoSettings& s, AVCodecContext& context, Options& options
   if (s.codec == "ffv1") configure_ffv1(s, context, options);
 }
 
-/// Leaves supplemental information out of an H.264 packet: x264 writes its settings, 700 bytes.
-std::vector<std::uint8_t> without_sei(std::span<const std::uint8_t> annex_b) {
-  constexpr std::uint8_t kSei = 6;
-  constexpr std::array<std::uint8_t, 3> kStart = {0, 0, 1};
-  std::vector<std::uint8_t> kept;
-  auto unit = std::search(annex_b.begin(), annex_b.end(), kStart.begin(), kStart.end());
-  while (unit != annex_b.end()) {
-    auto next = std::search(unit + 3, annex_b.end(), kStart.begin(), kStart.end());
-    auto end = next;
-    // The zero before a start code belongs to the start code.
-    if (next != annex_b.end() && *(next - 1) == 0) --end;
-    if (unit + 3 != annex_b.end() && (unit[3] & 31) != kSei) {
-      kept.push_back(0);
-      kept.insert(kept.end(), unit, end);
-    }
-    unit = next;
-  }
-  return kept;
-}
-
 }  // namespace
 
 VideoEncoder::VideoEncoder(VideoEncoder&&) noexcept = default;
 VideoEncoder& VideoEncoder::operator=(VideoEncoder&&) noexcept = default;
 VideoEncoder::~VideoEncoder() = default;
 
-Result<VideoEncoder> VideoEncoder::open(const VideoSettings& settings) {
+Result<VideoEncoder> VideoEncoder::start(const VideoSettings& settings) {
   const std::string name = encoder_name(settings.codec);
   const AVCodec* codec = avcodec_find_encoder_by_name(name.c_str());
   if (codec == nullptr) {
@@ -203,30 +185,69 @@ Result<VideoEncoder> VideoEncoder::open(const VideoSettings& settings) {
   if (const char* unknown = options.left_over()) {
     return fail(ErrorCode::kEnvironment, name + " has no option " + unknown);
   }
-  AVFrame& picture = *encoder.picture_;
-  picture.format = encoder.context_->pix_fmt;
-  picture.width = settings.width;
-  picture.height = settings.height;
+  RELIT_TRY(encoder.fill_grey());
+  return encoder;
+}
+
+Result<VideoEncoder> VideoEncoder::open(const VideoSettings& settings) {
+  RELIT_ASSIGN(VideoEncoder encoder, start(settings));
+  RELIT_TRY(encoder.describe_stream());
+  return encoder;
+}
+
+Result<std::vector<std::uint8_t>> VideoEncoder::headers() const {
+  if (settings_.codec != "av1" || context_->extradata_size > 0) {
+    return std::vector<std::uint8_t>(context_->extradata,
+                                     context_->extradata + context_->extradata_size);
+  }
+  // FFmpeg's libaom tells its sequence header only in key packets. Another encoder with the same
+  // settings has the same one.
+  RELIT_ASSIGN(VideoEncoder other, start(settings_));
+  other.picture_->pts = 0;
+  int error = avcodec_send_frame(other.context_.get(), other.picture_.get());
+  if (error >= 0) error = avcodec_send_frame(other.context_.get(), nullptr);
+  if (error >= 0) error = avcodec_receive_packet(other.context_.get(), other.packet_.get());
+  if (error < 0) {
+    return fail(ErrorCode::kEnvironment,
+                std::string(context_->codec->name) + " fails: " + decoders::ffmpeg::reason(error));
+  }
+  return std::vector<std::uint8_t>(other.packet_->data, other.packet_->data + other.packet_->size);
+}
+
+Status VideoEncoder::describe_stream() {
+  RELIT_ASSIGN(const std::vector<std::uint8_t> extradata, headers());
+  auto stored = decoders::stored_private(settings_.codec, extradata);
+  if (!stored) {
+    return fail(ErrorCode::kEnvironment,
+                std::string(context_->codec->name) +
+                    " gives headers that cannot be stored: " + stored.error().message);
+  }
+  codec_private_ = std::move(*stored);
+  RELIT_ASSIGN(decoder_pictures_, decoders::decoder_pictures(settings_.codec, codec_private_));
+  return {};
+}
+
+Status VideoEncoder::fill_grey() {
+  AVFrame& picture = *picture_;
+  picture.format = context_->pix_fmt;
+  picture.width = settings_.width;
+  picture.height = settings_.height;
   picture.color_range = AVCOL_RANGE_JPEG;
   if (av_frame_get_buffer(&picture, 0) < 0) {
     return fail(ErrorCode::kOutOfMemory, "no memory for a picture");
   }
-  for (int c = 0; c < av_pix_fmt_count_planes(encoder.context_->pix_fmt); ++c) {
-    const SampleTarget target = encoder.target(c);
-    const auto grey = static_cast<std::uint16_t>(1 << (settings.bit_depth - 1));
-    for (int y = 0; y < target.height; ++y) {
-      std::uint8_t* row = target.data + y * target.stride_bytes;
-      for (int x = 0; x < target.width; ++x) {
-        if (target.bytes_per_sample == 1) row[x] = static_cast<std::uint8_t>(grey);
-        if (target.bytes_per_sample == 2) std::memcpy(row + 2 * x, &grey, sizeof grey);
+  const auto grey = static_cast<std::uint16_t>(1 << (settings_.bit_depth - 1));
+  for (int c = 0; c < av_pix_fmt_count_planes(context_->pix_fmt); ++c) {
+    const SampleTarget plane = target(c);
+    for (int y = 0; y < plane.height; ++y) {
+      std::uint8_t* row = plane.data + y * plane.stride_bytes;
+      for (int x = 0; x < plane.width; ++x) {
+        if (plane.bytes_per_sample == 1) row[x] = static_cast<std::uint8_t>(grey);
+        if (plane.bytes_per_sample == 2) std::memcpy(row + 2 * x, &grey, sizeof grey);
       }
     }
   }
-  return encoder;
-}
-
-std::vector<std::uint8_t> VideoEncoder::codec_private() const {
-  return {context_->extradata, context_->extradata + context_->extradata_size};
+  return {};
 }
 
 Status VideoEncoder::begin_picture() {
@@ -286,10 +307,15 @@ Status VideoEncoder::receive(std::vector<CodedPacket>& out) {
     packet.key = (packet_->flags & AV_PKT_FLAG_KEY) != 0;
     const std::span<const std::uint8_t> bytes(packet_->data,
                                               static_cast<std::size_t>(packet_->size));
-    packet.bytes =
-        settings_.codec == "h264" ? without_sei(bytes) : std::vector(bytes.begin(), bytes.end());
-    out.push_back(std::move(packet));
+    auto stored = decoders::stored_packet(settings_.codec, bytes);
     av_packet_unref(packet_.get());
+    if (!stored) {
+      return fail(ErrorCode::kEnvironment, std::string(context_->codec->name) + ", frame " +
+                                               std::to_string(packet.pts) + ": " +
+                                               stored.error().message);
+    }
+    packet.bytes = std::move(*stored);
+    out.push_back(std::move(packet));
   }
 }
 

@@ -41,7 +41,7 @@ struct SampleTarget {
 struct CodedPacket {
   std::int64_t pts = 0;
   bool key = false;
-  std::vector<std::uint8_t> bytes;
+  std::vector<std::uint8_t> bytes;  ///< in the form of FORMAT.md, section 3.4
 };
 
 /// One stream. Not thread-safe; different encoders may run on different threads.
@@ -55,7 +55,9 @@ class VideoEncoder {
   ~VideoEncoder();
 
   /// What a decoder needs before the first packet: LayerRecord::codec_private.
-  [[nodiscard]] std::vector<std::uint8_t> codec_private() const;
+  [[nodiscard]] const std::vector<std::uint8_t>& codec_private() const { return codec_private_; }
+  /// How many pictures it holds at once: LayerRecord::mantissa_pictures.
+  [[nodiscard]] std::uint8_t decoder_pictures() const { return decoder_pictures_; }
 
   /// Makes the next picture writable. It still holds the previous one's samples; the first starts
   /// at mid-grey. Call before target() for every picture. Errors: kOutOfMemory.
@@ -71,8 +73,16 @@ class VideoEncoder {
 
  private:
   VideoEncoder() = default;
+  /// Everything of open() but describe_stream().
+  static Result<VideoEncoder> start(const VideoSettings& settings);
+  Status fill_grey();
+  /// The encoder's own form of what codec_private() gives.
+  [[nodiscard]] Result<std::vector<std::uint8_t>> headers() const;
+  Status describe_stream();
   Status receive(std::vector<CodedPacket>& out);
   VideoSettings settings_;
+  std::vector<std::uint8_t> codec_private_;
+  std::uint8_t decoder_pictures_ = 1;
   decoders::ffmpeg::Codec context_;
   decoders::ffmpeg::Frame picture_;
   decoders::ffmpeg::Packet packet_;

@@ -18,7 +18,17 @@ Unexpected system_failure(const std::string& doing, int error) {
   return fail(ErrorCode::kIo, doing + ": " + std::generic_category().message(error));
 }
 
+/// What a host's callback means by a negative number.
+Unexpected host_failure(const std::string& doing, std::int64_t code) {
+  constexpr std::int64_t kLast = static_cast<std::int64_t>(ErrorCode::kCancelled);
+  const bool known = code < 0 && code >= -kLast;
+  return fail(known ? static_cast<ErrorCode>(-code) : ErrorCode::kIo,
+              "the host cannot " + doing + ": its callback returned " + std::to_string(code));
+}
+
 }  // namespace
+
+void ByteSource::expect(std::uint64_t, std::uint64_t) {}
 
 Status ByteSource::seek(std::uint64_t) {
   return fail(ErrorCode::kUnsupported, "this source can only be read from front to back");
@@ -77,6 +87,41 @@ Result<std::size_t> MemorySource::read(std::span<std::uint8_t> out) {
 Status MemorySource::seek(std::uint64_t offset_bytes) {
   position_ = static_cast<std::size_t>(std::min<std::uint64_t>(offset_bytes, bytes_.size()));
   return {};
+}
+
+Result<std::unique_ptr<CallbackSource>> CallbackSource::open(const SourceCallbacks& callbacks) {
+  std::unique_ptr<CallbackSource> source(new CallbackSource(callbacks));
+  if (callbacks.read == nullptr)
+    return fail(ErrorCode::kInvalid, "a source of callbacks needs at least read()");
+  return source;
+}
+
+CallbackSource::~CallbackSource() {
+  if (callbacks_.close != nullptr) callbacks_.close(callbacks_.user);
+}
+
+Result<std::size_t> CallbackSource::read(std::span<std::uint8_t> out) {
+  const std::int64_t got = callbacks_.read(callbacks_.user, out.data(), out.size());
+  if (got < 0 || static_cast<std::uint64_t>(got) > out.size())
+    return host_failure("read " + std::to_string(out.size()) + " bytes", got);
+  return static_cast<std::size_t>(got);
+}
+
+std::optional<std::uint64_t> CallbackSource::size() const {
+  const std::int64_t bytes = callbacks_.size == nullptr ? -1 : callbacks_.size(callbacks_.user);
+  if (bytes < 0) return std::nullopt;
+  return static_cast<std::uint64_t>(bytes);
+}
+
+Status CallbackSource::seek(std::uint64_t offset_bytes) {
+  if (!seekable()) return ByteSource::seek(offset_bytes);
+  const int code = callbacks_.seek(callbacks_.user, offset_bytes);
+  if (code != 0) return host_failure("go to byte " + std::to_string(offset_bytes), code);
+  return {};
+}
+
+void CallbackSource::expect(std::uint64_t begin_bytes, std::uint64_t end_bytes) {
+  if (callbacks_.expect != nullptr) callbacks_.expect(callbacks_.user, begin_bytes, end_bytes);
 }
 
 }  // namespace relit::container

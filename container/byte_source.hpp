@@ -30,6 +30,11 @@ class ByteSource {
   /// Makes `offset_bytes` from the start the current position. Errors: kIo; kUnsupported if not
   /// seekable.
   virtual Status seek(std::uint64_t offset_bytes);
+
+  /// Says that the bytes [begin, end) will be read next and that those behind them may never be, so
+  /// that a source that fetches ranges fetches no more. Only a hint: everything can be read and
+  /// sought all the same. Each call replaces the one before.
+  virtual void expect(std::uint64_t begin_bytes, std::uint64_t end_bytes);
 };
 
 /// A file, or standard input. Pipes, sockets and devices are read too, but cannot be sought in.
@@ -77,6 +82,46 @@ class MemorySource final : public ByteSource {
   std::vector<std::uint8_t> owned_;
   std::span<const std::uint8_t> bytes_;
   std::size_t position_ = 0;
+};
+
+/// A source that a host implements in C. All functions are called from the thread that uses the
+/// source, never two at once.
+struct SourceCallbacks {
+  void* user = nullptr;  ///< handed to every function
+  /// Writes 1 to `bytes` (> 0) bytes to `out` and returns how many; 0 at the end; on failure an
+  /// ErrorCode negated: -1 for I/O, -10 where the host asked to stop. Must not be null.
+  std::int64_t (*read)(void* user, std::uint8_t* out, std::size_t bytes) = nullptr;
+  /// Makes `offset_bytes` the current position and returns 0, or an ErrorCode negated. Null: the
+  /// source only goes forward.
+  int (*seek)(void* user, std::uint64_t offset_bytes) = nullptr;
+  /// Bytes in all; negative: unknown, as where it is null.
+  std::int64_t (*size)(void* user) = nullptr;
+  /// ByteSource::expect(). May be null.
+  void (*expect)(void* user, std::uint64_t begin_bytes, std::uint64_t end_bytes) = nullptr;
+  /// Called once, when the source is destroyed. May be null.
+  void (*close)(void* user) = nullptr;
+};
+
+/// Bytes from a host's callbacks.
+class CallbackSource final : public ByteSource {
+ public:
+  /// Takes over `callbacks.user`: close() is called also where this fails. Errors: kInvalid for a
+  /// null read().
+  static Result<std::unique_ptr<CallbackSource>> open(const SourceCallbacks& callbacks);
+  ~CallbackSource() override;
+  CallbackSource(const CallbackSource&) = delete;
+  CallbackSource& operator=(const CallbackSource&) = delete;
+
+  Result<std::size_t> read(std::span<std::uint8_t> out) override;
+  [[nodiscard]] std::optional<std::uint64_t> size() const override;
+  [[nodiscard]] bool seekable() const override { return callbacks_.seek != nullptr; }
+  Status seek(std::uint64_t offset_bytes) override;
+  void expect(std::uint64_t begin_bytes, std::uint64_t end_bytes) override;
+
+ private:
+  explicit CallbackSource(const SourceCallbacks& callbacks) : callbacks_(callbacks) {}
+
+  SourceCallbacks callbacks_;
 };
 
 }  // namespace relit::container

@@ -51,6 +51,7 @@ Result<Reader> Reader::open(std::unique_ptr<ByteSource> source, const ReaderOpti
   return catch_out_of_memory("opening a file", [&]() -> Result<Reader> {
     Reader reader(std::move(source), options);
     RELIT_TRY(reader.read_header());
+    if (options.sparing) RELIT_TRY(reader.learn_layout());
     return reader;
   });
 }
@@ -107,7 +108,7 @@ void Reader::count_damage(const Error& error) {
 void Reader::pass_unwanted_chunks() {
   while (segment_ && chunk_ < segment_->chunks.size()) {
     const auto& chunk = segment_->chunks[chunk_];
-    if (!wanted_ || std::ranges::binary_search(*wanted_, chunk.track_id)) return;
+    if (is_wanted(chunk.track_id)) return;
     input_.skip_bytes(chunk.chunk_bytes);
     ++chunk_;
   }
@@ -120,6 +121,7 @@ Result<std::optional<RecordHeader>> Reader::peek_known() {
     if (fatal_) return Unexpected{*fatal_};
     if (input_.framing_lost()) return input_.peek();
     pass_unwanted_chunks();
+    announce();
     auto peeked = input_.peek();
     const std::uint64_t offset = input_.offset_bytes();
     if (!peeked) {
@@ -148,10 +150,29 @@ Result<std::optional<RecordHeader>> Reader::peek_known() {
       continue;
     }
     if (segment_ || finished_) return *peeked;  // for check_place() to refuse
-    if (copy && order < kSegmentOrder && order_ == kSegmentOrder && copies_offset_ == 0)
-      copies_offset_ = offset;
-    input_.skip();
+    if (copy && order < kSegmentOrder && copies_offset_ == 0) copies_offset_ = offset;
+    if (options_.on_passed_over) options_.on_passed_over(header, offset);
+    if (copy) {
+      input_.skip();
+      pass_copies(offset);
+    } else {
+      pass_unknown(header, offset);
+    }
   }
+}
+
+void Reader::pass_unknown(const RecordHeader& header, std::uint64_t offset) {
+  const RecordType type = header.type;
+  const bool plain = (header.flags & flags::kCriticalMask) == 0;
+  if (!options_.on_unknown || !plain || header.payload_bytes > options_.max_record_bytes) {
+    input_.skip();
+    return;
+  }
+  const auto payload = input_.payload();
+  if (payload)
+    options_.on_unknown(type, *payload);
+  else if (!input_.framing_lost())
+    (void)damaged(payload.error(), type, offset);
 }
 
 Status Reader::check_place(const RecordHeader& header) {
@@ -193,6 +214,8 @@ Result<std::optional<Record>> Reader::next_record() {
     return failure;
   }
   order_ = order_of(header->type);
+  // Copies in a stream do not count: those of the end stand behind everything else.
+  if (order_ <= kSegmentOrder) copies_offset_ = 0;
   if (header->type == types::kIndex) index_offset_ = offset;
   if (header->type == types::kChunk) ++chunk_;
 
@@ -232,6 +255,7 @@ Result<RecordBody> Reader::read_body(const RecordHeader& header) {
 Result<RecordBody> Reader::accept(RecordBody body, std::uint64_t offset) {
   if (const auto* segment = std::get_if<SegmentRecord>(&body)) {
     RELIT_TRY(accept_segment(*segment));
+    segment_guess_ = input_.offset_bytes() - offset + wanted_run();
   } else if (const auto* chunk = std::get_if<ChunkRecord>(&body)) {
     const auto track = segment_->chunks[chunk_ - 1].track_id;
     if (chunk->track_id != track)
@@ -261,6 +285,7 @@ Status Reader::accept_segment(const SegmentRecord& segment) {
   next_segment_index_ = segment.index + 1;
   segment_ = segment;
   chunk_ = 0;
+  copies_offset_ = 0;  // the end speaks of those behind the last segment
   return {};
 }
 
@@ -301,6 +326,8 @@ void Reader::enter_segments() {
   segment_.reset();
   sought_.reset();
   order_ = kSegmentOrder;
+  announced_end_ = 0;
+  copies_offset_ = 0;
   jumped_ = true;
   finished_ = false;
 }
@@ -341,6 +368,7 @@ Result<EndRecord> read_end(RecordInput& input, std::uint64_t size) {
                 "the file does not end with an end record, so there is no "
                 "index to find");
   RELIT_TRY(input.seek(size - kEndBytes));
+  input.expect(size - kEndBytes, size);
   auto end_body = read_alone(input, types::kEnd);
   if (!end_body) {
     const auto code = end_body.error().code;
@@ -359,6 +387,7 @@ Result<IndexRecord> read_index_from_end(RecordInput& input, std::uint64_t size) 
   RELIT_ASSIGN(const EndRecord end, read_end(input, size));
   if (end.index_offset == 0) return fail(ErrorCode::kNotFound, "the file has no index");
   RELIT_TRY(input.seek(end.index_offset));
+  input.expect(end.index_offset, size);
   RELIT_ASSIGN(auto index, read_alone(input, types::kIndex));
   return std::get<IndexRecord>(std::move(index));
 }
@@ -369,6 +398,7 @@ Result<std::vector<std::optional<Record>>> read_copies_from_end(RecordInput& inp
   RELIT_ASSIGN(const EndRecord end, read_end(input, size));
   if (end.copies_offset == 0) return fail(ErrorCode::kNotFound, "the file has no copies");
   RELIT_TRY(input.seek(end.copies_offset));
+  input.expect(end.copies_offset, size);
   std::vector<std::optional<Record>> records;
   std::uint64_t bytes = 0;
   for (;;) {
@@ -411,7 +441,29 @@ auto Reader::read_aside(Read&& read)
   RecordInput input(*source_, 0, options_.verify_checksums);
   auto found = read(input, *source_->size());
   RELIT_TRY(source_->seek(resume));
+  announced_end_ = 0;
   return found;
+}
+
+/// Reads the end record, by which the static part is as long as its copies; where there are none,
+/// the source finds its way in steps.
+Status Reader::learn_layout() {
+  if (!source_->seekable() || !source_->size()) return {};
+  const auto end =
+      read_aside([](RecordInput& input, std::uint64_t size) { return read_end(input, size); });
+  if (!end) {
+    const bool source_failed =
+        end.error().code == ErrorCode::kIo || end.error().code == ErrorCode::kCancelled;
+    if (source_failed) return Unexpected{end.error()};
+    return {};
+  }
+  end_ = *end;
+  segments_end_ = end->file_bytes - record_bytes(kEndPayloadBytes);
+  if (end->index_offset != 0) segments_end_ = end->index_offset;
+  if (end->copies_offset != 0) segments_end_ = end->copies_offset;
+  if (end->copies_offset != 0 && end->index_offset > end->copies_offset)
+    static_end_ = kSignature.size() + (end->index_offset - end->copies_offset);
+  return {};
 }
 
 Result<IndexRecord> Reader::read_index() {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -34,6 +35,16 @@ struct ReaderOptions {
   /// less.
   std::uint64_t max_record_bytes = limits::kRecordBytes;
   std::uint64_t max_static_bytes = limits::kStaticBytes;
+  /// Told of every intact header whose record next() passes over: copies and unknown ancillary
+  /// records, not chunks of unwanted tracks.
+  std::function<void(const RecordHeader& header, std::uint64_t offset_bytes)> on_passed_over = {};
+  /// Is given the ancillary records of unknown type that the reader passes over, as far as they are
+  /// intact; the payload is valid during the call.
+  std::function<void(RecordType, std::span<const std::uint8_t>)> on_unknown = {};
+  /// Tells the source which bytes will be read (ByteSource::expect), so that one with byte ranges
+  /// fetches no tracks that are not wanted. Costs one read at the end of the file while opening,
+  /// and at most two requests a segment; reading everything is cheaper without.
+  bool sparing = false;
 };
 
 /// What the reader could not give.
@@ -110,9 +121,16 @@ class Reader {
         input_(*source_, 0, options.verify_checksums) {}
 
   Status read_header();
+  Status learn_layout();
+  void announce();
+  [[nodiscard]] std::uint64_t wanted_run() const;
+  [[nodiscard]] bool is_wanted(std::uint32_t track_id) const;
+  [[nodiscard]] std::uint64_t behind_segments(std::uint64_t begin) const;
+  void pass_copies(std::uint64_t offset);
   Result<std::optional<Record>> next_record();
   Result<std::optional<RecordHeader>> peek_known();
   void pass_unwanted_chunks();
+  void pass_unknown(const RecordHeader& header, std::uint64_t offset);
   Status check_place(const RecordHeader& header);
   Result<RecordBody> read_body(const RecordHeader& header);
   Result<RecordBody> accept(RecordBody body, std::uint64_t offset);
@@ -136,9 +154,14 @@ class Reader {
   std::optional<IndexRecord::Entry> sought_;
   std::optional<std::vector<std::uint32_t>> wanted_;  ///< sorted
   std::uint64_t static_bytes_ = 0;
-  std::uint64_t index_offset_ = 0;   ///< 0: not seen
-  std::uint64_t copies_offset_ = 0;  ///< of the first copy behind a segment; 0: not seen
-  bool jumped_ = false;              ///< by seek or resync: what was not seen may be there
+  std::optional<EndRecord> end_;       ///< read beforehand, where that spares bytes
+  std::uint64_t static_end_ = 0;       ///< where the first segment is expected; 0: unknown
+  std::uint64_t segments_end_ = 0;     ///< known where end_ is
+  std::uint64_t announced_end_ = 0;    ///< what the source was told to expect
+  std::uint64_t segment_guess_ = 512;  ///< the next segment's record and first wanted chunks
+  std::uint64_t index_offset_ = 0;     ///< 0: not seen
+  std::uint64_t copies_offset_ = 0;    ///< of the first copy since the last other record
+  bool jumped_ = false;                ///< by seek or resync: what was not seen may be there
   bool finished_ = false;
   std::optional<Error> fatal_;
   std::uint64_t damaged_records_ = 0;

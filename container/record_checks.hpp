@@ -14,11 +14,13 @@
 /// Conditions that the validate() functions of the record codecs share.
 namespace relit::container::checks {
 
-/// kCorrupt with `message` unless `condition` holds.
-[[nodiscard]] inline Status require(bool condition, std::string_view message) {
-  if (condition) return {};
-  return fail(ErrorCode::kCorrupt, std::string(message));
-}
+/// Returns kCorrupt with `message` from the function it stands in unless `condition` holds. A
+/// macro, so that messages are put together only when somebody will read them: parsing would
+/// otherwise spend a third of its time on them.
+#define RELIT_REQUIRE(condition, message)                                                       \
+  do {                                                                                          \
+    if (!(condition)) return ::relit::fail(::relit::ErrorCode::kCorrupt, std::string(message)); \
+  } while (false)
 
 /// kLimit unless value <= limit.
 [[nodiscard]] inline Status at_most(std::uint64_t value, std::uint64_t limit, const char* what) {
@@ -34,7 +36,8 @@ namespace relit::container::checks {
 }
 
 [[nodiscard]] inline Status finite(float value, const char* what) {
-  return require(std::isfinite(value), std::string(what) + " is not a finite number");
+  RELIT_REQUIRE(std::isfinite(value), std::string(what) + " is not a finite number");
+  return {};
 }
 template <class Range>
 [[nodiscard]] Status finite(const Range& values, const char* what) {
@@ -45,14 +48,15 @@ template <class Range>
 template <class Range>
 [[nodiscard]] Status not_negative(const Range& values, const char* what) {
   RELIT_TRY(finite(values, what));
-  for (const float v : values) RELIT_TRY(require(v >= 0, std::string(what) + " is negative"));
+  for (const float v : values) RELIT_REQUIRE(v >= 0, std::string(what) + " is negative");
   return {};
 }
 
 [[nodiscard]] inline Status text(std::string_view value, const char* what,
                                  std::uint32_t limit = limits::kStringBytes) {
   RELIT_TRY(at_most(value.size(), limit, what));
-  return require(is_valid_utf8(value), std::string(what) + " is not valid UTF-8");
+  RELIT_REQUIRE(is_valid_utf8(value), std::string(what) + " is not valid UTF-8");
+  return {};
 }
 
 /// kUnsupported unless the enumerator lies in 0..last.

@@ -108,23 +108,23 @@ Status validate_streams(const std::vector<VertexStream>& streams) {
   for (const VertexStream& s : streams) {
     RELIT_TRY(known(s.semantic, Semantic::kWeights, "stream.semantic"));
     ++count[static_cast<std::size_t>(s.semantic)];
-    RELIT_TRY(require(s.stride == stride_of(s.semantic),
-                      "stream.stride " + std::to_string(s.stride) + " should be " +
-                          std::to_string(stride_of(s.semantic)) + " for semantic " +
-                          std::to_string(static_cast<int>(s.semantic))));
+    RELIT_REQUIRE(s.stride == stride_of(s.semantic),
+                  "stream.stride " + std::to_string(s.stride) + " should be " +
+                      std::to_string(stride_of(s.semantic)) + " for semantic " +
+                      std::to_string(static_cast<int>(s.semantic)));
     RELIT_TRY(finite(s.offset, "stream.offset"));
     RELIT_TRY(not_negative(s.scale, "stream.scale"));
-    RELIT_TRY(require(!s.bytes.empty(), "stream.bytes is empty"));
+    RELIT_REQUIRE(!s.bytes.empty(), "stream.bytes is empty");
   }
   const auto of = [&](Semantic s) { return count[static_cast<std::size_t>(s)]; };
-  RELIT_TRY(require(of(Semantic::kPosition) == 1, "a mesh needs exactly one position stream"));
-  RELIT_TRY(
-      require(of(Semantic::kLightMapUv) == 1, "a mesh needs exactly one light-map UV stream"));
-  RELIT_TRY(require(
+  RELIT_REQUIRE(of(Semantic::kPosition) == 1, "a mesh needs exactly one position stream");
+  RELIT_REQUIRE(of(Semantic::kLightMapUv) == 1, "a mesh needs exactly one light-map UV stream");
+  RELIT_REQUIRE(
       of(Semantic::kNormal) <= 1 && of(Semantic::kAlbedoUv) <= 1 && of(Semantic::kColor) <= 1,
-      "normals, albedo UVs and colours have at most one stream each"));
-  return require(of(Semantic::kJoints) <= 2 && of(Semantic::kJoints) == of(Semantic::kWeights),
-                 "joints and weights need as many streams, at most two of each");
+      "normals, albedo UVs and colours have at most one stream each");
+  RELIT_REQUIRE(of(Semantic::kJoints) <= 2 && of(Semantic::kJoints) == of(Semantic::kWeights),
+                "joints and weights need as many streams, at most two of each");
+  return {};
 }
 
 }  // namespace
@@ -133,15 +133,15 @@ Status validate(const MeshRecord& record) {
   RELIT_TRY(text(record.name, "name"));
   RELIT_TRY(one_to(record.vertex_count, limits::kVerticesPerMesh, "vertex_count"));
   RELIT_TRY(one_to(record.index_count, limits::kIndicesPerMesh, "index_count"));
-  RELIT_TRY(require(record.index_count % 3 == 0, "index_count is not a multiple of 3"));
+  RELIT_REQUIRE(record.index_count % 3 == 0, "index_count is not a multiple of 3");
   RELIT_TRY(validate_streams(record.streams));
-  RELIT_TRY(require(!record.indices.empty(), "indices is empty"));
+  RELIT_REQUIRE(!record.indices.empty(), "indices is empty");
   RELIT_TRY(at_most(record.morph_targets.size(), limits::kMorphTargets, "number of morph targets"));
   RELIT_TRY(at_most(std::uint64_t{record.first_morph_weight} + record.morph_targets.size(),
                     limits::kMorphWeights, "last morph weight"));
   for (const MorphTarget& t : record.morph_targets) {
     RELIT_TRY(not_negative(t.scale, "morph_target.scale"));
-    RELIT_TRY(require(!t.bytes.empty(), "morph_target.bytes is empty"));
+    RELIT_REQUIRE(!t.bytes.empty(), "morph_target.bytes is empty");
   }
   return {};
 }
@@ -187,15 +187,15 @@ Status validate(const SkeletonRecord& record) {
   RELIT_TRY(at_most(record.palette.size(), limits::kPalette, "number of palette entries"));
   for (std::size_t i = 0; i < record.nodes.size(); ++i) {
     const NodeRecord& n = record.nodes[i];
-    RELIT_TRY(require(n.parent >= -1 && n.parent < static_cast<std::int64_t>(i),
-                      "node " + std::to_string(i) + " has parent " + std::to_string(n.parent) +
-                          ": parents come before their children, roots have -1"));
+    RELIT_REQUIRE(n.parent >= -1 && n.parent < static_cast<std::int64_t>(i),
+                  "node " + std::to_string(i) + " has parent " + std::to_string(n.parent) +
+                      ": parents come before their children, roots have -1");
     RELIT_TRY(finite(n.local, "node.local"));
   }
   for (const PaletteEntry& p : record.palette) {
-    RELIT_TRY(require(p.node < record.nodes.size(), "palette entry refers to node " +
-                                                        std::to_string(p.node) + " of " +
-                                                        std::to_string(record.nodes.size())));
+    RELIT_REQUIRE(p.node < record.nodes.size(), "palette entry refers to node " +
+                                                    std::to_string(p.node) + " of " +
+                                                    std::to_string(record.nodes.size()));
     RELIT_TRY(finite(p.inverse_bind, "palette.inverse_bind"));
   }
   return {};
@@ -272,22 +272,22 @@ Status validate_joints(const PoseTrackRecord& record) {
     for (const float q : t.rotation) square += double{q} * double{q};
     // Normalised in single precision a quaternion is off by some 1e-7; 1e-3 forgives sloppy
     // exporters.
-    RELIT_TRY(
-        require(std::abs(std::sqrt(square) - 1) < 1e-3, "rest.rotation is not of unit length"));
+    RELIT_REQUIRE(std::abs(std::sqrt(square) - 1) < 1e-3, "rest.rotation is not of unit length");
     keys.push_back(t.node);
   }
-  RELIT_TRY(require(!has_duplicates(std::move(keys)), "two rest entries for the same node"));
+  RELIT_REQUIRE(!has_duplicates(std::move(keys)), "two rest entries for the same node");
   keys.clear();
   for (const PoseChannel& c : record.channels) {
     RELIT_TRY(known(c.target, ChannelTarget::kMorphWeight, "channel.target"));
     const bool morph = c.target == ChannelTarget::kMorphWeight;
-    RELIT_TRY(require(c.index < (morph ? limits::kMorphWeights : limits::kNodes),
-                      "channel.index " + std::to_string(c.index) + " is out of range"));
+    RELIT_REQUIRE(c.index < (morph ? limits::kMorphWeights : limits::kNodes),
+                  "channel.index " + std::to_string(c.index) + " is out of range");
     RELIT_TRY(finite(c.offset, "channel.offset"));
     RELIT_TRY(not_negative(c.step, "channel.step"));
     keys.push_back((std::uint64_t{c.index} << 8) | static_cast<std::uint8_t>(c.target));
   }
-  return require(!has_duplicates(std::move(keys)), "two channels animate the same quantity");
+  RELIT_REQUIRE(!has_duplicates(std::move(keys)), "two channels animate the same quantity");
+  return {};
 }
 
 }  // namespace
@@ -298,19 +298,20 @@ Status validate(const PoseTrackRecord& record) {
   RELIT_TRY(at_most(record.channels.size(), limits::kPoseChannels, "number of channels"));
   RELIT_TRY(at_most(record.vertex_ranges.size(), limits::kMeshes, "number of vertex ranges"));
   if (record.kind == PoseKind::kJoints) {
-    RELIT_TRY(require(record.vertex_ranges.empty(), "vertex ranges in a track of joints"));
+    RELIT_REQUIRE(record.vertex_ranges.empty(), "vertex ranges in a track of joints");
     return validate_joints(record);
   }
-  RELIT_TRY(require(record.rest.empty() && record.channels.empty(),
-                    "joint channels in a track of vertices"));
-  RELIT_TRY(require(!record.vertex_ranges.empty(), "a track of vertices needs vertex ranges"));
+  RELIT_REQUIRE(record.rest.empty() && record.channels.empty(),
+                "joint channels in a track of vertices");
+  RELIT_REQUIRE(!record.vertex_ranges.empty(), "a track of vertices needs vertex ranges");
   std::vector<std::uint32_t> meshes;
   for (const VertexRange& v : record.vertex_ranges) {
     RELIT_TRY(finite(v.offset, "vertex_range.offset"));
     RELIT_TRY(not_negative(v.step, "vertex_range.step"));
     meshes.push_back(v.mesh_id);
   }
-  return require(!has_duplicates(std::move(meshes)), "two vertex ranges for the same mesh");
+  RELIT_REQUIRE(!has_duplicates(std::move(meshes)), "two vertex ranges for the same mesh");
+  return {};
 }
 
 }  // namespace relit::container

@@ -48,7 +48,8 @@ Status codec_name(const std::string& name, const char* what) {
   const bool good = std::ranges::all_of(name, [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
   });
-  return require(good, std::string(what) + " has other characters than a-z, 0-9, _ and -");
+  RELIT_REQUIRE(good, std::string(what) + " has other characters than a-z, 0-9, _ and -");
+  return {};
 }
 
 }  // namespace
@@ -89,13 +90,13 @@ Status validate(const ModelRecord& record) {
   RELIT_TRY(at_most(record.order, limits::kShOrder, "order"));
   RELIT_TRY(one_to(record.width, limits::kLightMapSide, "width"));
   RELIT_TRY(one_to(record.height, limits::kLightMapSide, "height"));
-  RELIT_TRY(require(
+  RELIT_REQUIRE(
       record.prediction_plane >= -1 && record.prediction_plane < static_cast<int>(limits::kPlanes),
-      "prediction_plane is neither -1 nor the number of a plane"));
+      "prediction_plane is neither -1 nor the number of a plane");
   const std::size_t coefficients = (record.order + 1u) * (record.order + 1u);
-  RELIT_TRY(require(record.mean.size() == coefficients,
-                    "mean has " + std::to_string(record.mean.size()) + " entries, order " +
-                        std::to_string(record.order) + " needs " + std::to_string(coefficients)));
+  RELIT_REQUIRE(record.mean.size() == coefficients,
+                "mean has " + std::to_string(record.mean.size()) + " entries, order " +
+                    std::to_string(record.order) + " needs " + std::to_string(coefficients));
   for (const Rgb& mean : record.mean) RELIT_TRY(finite(mean, "mean"));
   return {};
 }
@@ -194,29 +195,29 @@ Result<LayerRecord> parse_layer(std::span<const std::uint8_t> payload) {
 namespace {
 
 Status validate_exponents(const LayerRecord& record) {
-  RELIT_TRY(require(record.exponent_track != record.mantissa_track,
-                    "exponent_track is the same as mantissa_track"));
+  RELIT_REQUIRE(record.exponent_track != record.mantissa_track,
+                "exponent_track is the same as mantissa_track");
   RELIT_TRY(codec_name(record.exponent_codec, "exponent_codec"));
   RELIT_TRY(
       at_most(record.exponent_private.size(), limits::kCodecPrivateBytes, "exponent_private"));
   RELIT_TRY(one_to(record.exponent_width, limits::kVideoSide, "exponent_width"));
   RELIT_TRY(one_to(record.exponent_height, limits::kVideoSide, "exponent_height"));
   RELIT_TRY(one_to(record.exponent_pictures, limits::kDecoderPictures, "exponent_pictures"));
-  return require(
+  RELIT_REQUIRE(
       std::has_single_bit(record.exponent_block) && record.exponent_block <= 32,
       "exponent_block " + std::to_string(record.exponent_block) + " is not 1, 2, 4, 8, 16 or 32");
+  return {};
 }
 
 Status validate_matrix(const PlaneRecord& plane) {
   RELIT_TRY(at_most(plane.matrix.size(), kMatrixEntries, "number of matrix entries"));
   std::uint64_t seen = 0;
   for (const MatrixEntry& m : plane.matrix) {
-    RELIT_TRY(require(m.coefficient < limits::kCoefficients, "matrix.coefficient is not below 16"));
-    RELIT_TRY(require(m.channel < 3, "matrix.channel is not 0, 1 or 2"));
+    RELIT_REQUIRE(m.coefficient < limits::kCoefficients, "matrix.coefficient is not below 16");
+    RELIT_REQUIRE(m.channel < 3, "matrix.channel is not 0, 1 or 2");
     RELIT_TRY(finite(m.value, "matrix.value"));
     const std::uint64_t bit = std::uint64_t{1} << (3 * m.coefficient + m.channel);
-    RELIT_TRY(
-        require((seen & bit) == 0, "two matrix entries for the same coefficient and channel"));
+    RELIT_REQUIRE((seen & bit) == 0, "two matrix entries for the same coefficient and channel");
     seen |= bit;
   }
   return {};
@@ -224,26 +225,26 @@ Status validate_matrix(const PlaneRecord& plane) {
 
 Status validate_plane(const LayerRecord& layer, const PlaneRecord& plane) {
   const Rect& m = plane.mantissa_rect;
-  RELIT_TRY(require(plane.component < (layer.chroma == Chroma::kLuma ? 1 : 3),
-                    "component " + std::to_string(plane.component) + " does not exist"));
-  RELIT_TRY(require(inside(m, layer.coded_width, layer.coded_height),
-                    "mantissa_rect is empty or leaves the coded picture"));
+  RELIT_REQUIRE(plane.component < (layer.chroma == Chroma::kLuma ? 1 : 3),
+                "component " + std::to_string(plane.component) + " does not exist");
+  RELIT_REQUIRE(inside(m, layer.coded_width, layer.coded_height),
+                "mantissa_rect is empty or leaves the coded picture");
   RELIT_TRY(at_most(m.width, limits::kLightMapSide, "mantissa_rect.width"));
   RELIT_TRY(at_most(m.height, limits::kLightMapSide, "mantissa_rect.height"));
   if (layer.chroma == Chroma::k420 && plane.component > 0)
-    RELIT_TRY(require(m.x % 2 == 0 && m.y % 2 == 0,
-                      "mantissa_rect of a 4:2:0 chroma plane starts at an odd sample"));
+    RELIT_REQUIRE(m.x % 2 == 0 && m.y % 2 == 0,
+                  "mantissa_rect of a 4:2:0 chroma plane starts at an odd sample");
   if (layer.has_exponents) {
     const Rect& e = plane.exponent_rect;
     const int block = layer.exponent_block;
-    RELIT_TRY(require(inside(e, layer.exponent_width, layer.exponent_height),
-                      "exponent_rect is empty or leaves the exponent picture"));
-    RELIT_TRY(require(
+    RELIT_REQUIRE(inside(e, layer.exponent_width, layer.exponent_height),
+                  "exponent_rect is empty or leaves the exponent picture");
+    RELIT_REQUIRE(
         e.width == (m.width + block - 1) / block && e.height == (m.height + block - 1) / block,
-        "exponent_rect does not have one sample for each exponent block"));
+        "exponent_rect does not have one sample for each exponent block");
   }
   RELIT_TRY(finite(plane.scale, "scale"));
-  RELIT_TRY(require(plane.scale > 0, "scale is not positive"));
+  RELIT_REQUIRE(plane.scale > 0, "scale is not positive");
   return validate_matrix(plane);
 }
 
@@ -254,8 +255,8 @@ Status validate(const LayerRecord& record) {
   RELIT_TRY(at_most(record.codec_private.size(), limits::kCodecPrivateBytes, "codec_private"));
   RELIT_TRY(one_to(record.coded_width, limits::kVideoSide, "coded_width"));
   RELIT_TRY(one_to(record.coded_height, limits::kVideoSide, "coded_height"));
-  RELIT_TRY(require(record.bit_depth == 8 || record.bit_depth == 10,
-                    "bit_depth " + std::to_string(record.bit_depth) + " is neither 8 nor 10"));
+  RELIT_REQUIRE(record.bit_depth == 8 || record.bit_depth == 10,
+                "bit_depth " + std::to_string(record.bit_depth) + " is neither 8 nor 10");
   RELIT_TRY(known(record.chroma, Chroma::k444, "chroma"));
   RELIT_TRY(one_to(record.mantissa_pictures, limits::kDecoderPictures, "mantissa_pictures"));
   if (record.has_exponents) RELIT_TRY(validate_exponents(record));
@@ -266,9 +267,9 @@ Status validate(const LayerRecord& record) {
       return fail(status.error().code,
                   "plane " + std::to_string(i) + ": " + status.error().message);
     for (std::size_t k = 0; k < i; ++k)
-      RELIT_TRY(require(record.planes[k].component != plane.component ||
-                            !overlap(record.planes[k].mantissa_rect, plane.mantissa_rect),
-                        "planes " + std::to_string(k) + " and " + std::to_string(i) + " overlap"));
+      RELIT_REQUIRE(record.planes[k].component != plane.component ||
+                        !overlap(record.planes[k].mantissa_rect, plane.mantissa_rect),
+                    "planes " + std::to_string(k) + " and " + std::to_string(i) + " overlap");
   }
   return {};
 }

@@ -77,21 +77,20 @@ Result<ClipRecord> parse_clip(std::span<const std::uint8_t> payload) {
 Status validate(const ClipRecord& record) {
   RELIT_TRY(text(record.name, "name"));
   const auto& rate = record.tick_rate;
-  RELIT_TRY(require(rate.num > 0 && rate.den > 0 && rate.num <= limits::kRational &&
-                        rate.den <= limits::kRational,
-                    "tick_rate " + std::to_string(rate.num) + "/" + std::to_string(rate.den) +
-                        " is not a fraction of two integers in 1..2147483647"));
+  RELIT_REQUIRE(rate.num > 0 && rate.den > 0 && rate.num <= limits::kRational &&
+                    rate.den <= limits::kRational,
+                "tick_rate " + std::to_string(rate.num) + "/" + std::to_string(rate.den) +
+                    " is not a fraction of two integers in 1..2147483647");
   RELIT_TRY(one_to(record.frame_count, limits::kFrames, "frame_count"));
   RELIT_TRY(one_to(record.duration_ticks, limits::kTicks, "duration_ticks"));
-  RELIT_TRY(require(record.duration_ticks >= record.frame_count,
-                    "duration_ticks " + std::to_string(record.duration_ticks) +
-                        " is less than one tick for each of " + std::to_string(record.frame_count) +
-                        " frames"));
+  RELIT_REQUIRE(record.duration_ticks >= record.frame_count,
+                "duration_ticks " + std::to_string(record.duration_ticks) +
+                    " is less than one tick for each of " + std::to_string(record.frame_count) +
+                    " frames");
   RELIT_TRY(finite(record.bounds_min, "bounds_min"));
   RELIT_TRY(finite(record.bounds_max, "bounds_max"));
   for (std::size_t i = 0; i < 3; ++i)
-    RELIT_TRY(
-        require(record.bounds_min[i] <= record.bounds_max[i], "bounds_min lies above bounds_max"));
+    RELIT_REQUIRE(record.bounds_min[i] <= record.bounds_max[i], "bounds_min lies above bounds_max");
   return {};
 }
 
@@ -120,7 +119,8 @@ Status validate(const ImageRecord& record) {
   if (record.media_type != "image/png" && record.media_type != "image/jpeg")
     return fail(ErrorCode::kUnsupported, "media_type '" + record.media_type +
                                              "' is unknown: image/png and image/jpeg are known");
-  return require(!record.bytes.empty(), "the image has no bytes");
+  RELIT_REQUIRE(!record.bytes.empty(), "the image has no bytes");
+  return {};
 }
 
 std::vector<std::uint8_t> serialize(const MaterialRecord& record) {
@@ -157,9 +157,9 @@ Result<MaterialRecord> parse_material(std::span<const std::uint8_t> payload) {
 Status validate(const MaterialRecord& record) {
   RELIT_TRY(text(record.name, "name"));
   RELIT_TRY(not_negative(record.base_color, "base_color"));
-  RELIT_TRY(require(std::ranges::all_of(record.base_color, [](float v) { return v <= 1; }),
-                    "base_color exceeds 1"));
-  RELIT_TRY(require(record.image_id >= -1, "image_id is below -1"));
+  RELIT_REQUIRE(std::ranges::all_of(record.base_color, [](float v) { return v <= 1; }),
+                "base_color exceeds 1");
+  RELIT_REQUIRE(record.image_id >= -1, "image_id is below -1");
   RELIT_TRY(known(record.wrap_u, Wrap::kMirror, "wrap_u"));
   RELIT_TRY(known(record.wrap_v, Wrap::kMirror, "wrap_v"));
   RELIT_TRY(known(record.alpha_mode, AlphaMode::kBlend, "alpha_mode"));

@@ -74,28 +74,28 @@ Result<SegmentRecord> parse_segment(std::span<const std::uint8_t> payload) {
 }
 
 Status validate(const SegmentRecord& record) {
-  RELIT_TRY(require(record.index < limits::kSegments,
-                    "index is not below " + std::to_string(limits::kSegments)));
+  RELIT_REQUIRE(record.index < limits::kSegments,
+                "index is not below " + std::to_string(limits::kSegments));
   RELIT_TRY(frame_range(record.first_frame, record.frame_count));
-  RELIT_TRY(require(record.durations.empty() || record.durations.size() == record.frame_count,
-                    "there are " + std::to_string(record.durations.size()) + " durations for " +
-                        std::to_string(record.frame_count) + " frames"));
-  RELIT_TRY(require(std::ranges::find(record.durations, 0u) == record.durations.end(),
-                    "a frame lasts no tick"));
+  RELIT_REQUIRE(record.durations.empty() || record.durations.size() == record.frame_count,
+                "there are " + std::to_string(record.durations.size()) + " durations for " +
+                    std::to_string(record.frame_count) + " frames");
+  RELIT_REQUIRE(std::ranges::find(record.durations, 0u) == record.durations.end(),
+                "a frame lasts no tick");
   RELIT_TRY(at_most(record.first_tick, limits::kTicks, "first_tick"));
   RELIT_TRY(at_most(record.first_tick + duration_ticks(record), limits::kTicks, "end in ticks"));
   RELIT_TRY(at_most(record.chunks.size(), limits::kChunksPerSegment, "number of chunks"));
   std::vector<std::uint32_t> tracks;
   for (const auto& chunk : record.chunks) {
     RELIT_TRY(at_most(chunk.chunk_bytes, record_bytes(limits::kRecordBytes), "chunk_bytes"));
-    RELIT_TRY(require(
+    RELIT_REQUIRE(
         chunk.chunk_bytes > kRecordHeaderBytes && chunk.chunk_bytes % kRecordAlignment == 0,
-        "chunk_bytes " + std::to_string(chunk.chunk_bytes) + " is not the length of a record"));
+        "chunk_bytes " + std::to_string(chunk.chunk_bytes) + " is not the length of a record");
     tracks.push_back(chunk.track_id);
   }
   std::ranges::sort(tracks);
-  return require(std::ranges::adjacent_find(tracks) == tracks.end(),
-                 "two chunks of the same track");
+  RELIT_REQUIRE(std::ranges::adjacent_find(tracks) == tracks.end(), "two chunks of the same track");
+  return {};
 }
 
 std::vector<std::uint8_t> serialize(const ChunkRecord& record) {
@@ -157,8 +157,8 @@ Result<ChunkRecord> parse_chunk(std::span<const std::uint8_t> payload) {
   RELIT_TRY(at_most(table_bytes, kTableBytes, "table_bytes"));
   ByteReader table(r.raw("table", table_bytes));
   RELIT_TRY(r.status());
-  RELIT_TRY(require(count <= table.remaining() / kPacketLeastBytes,
-                    "table_bytes is too small for packet_count"));
+  RELIT_REQUIRE(count <= table.remaining() / kPacketLeastBytes,
+                "table_bytes is too small for packet_count");
   record.packets.resize(count);
   read_packets(table, first_pts, record.packets);
   RELIT_TRY(table.finish());
@@ -169,24 +169,25 @@ Result<ChunkRecord> parse_chunk(std::span<const std::uint8_t> payload) {
 }
 
 Status validate(const ChunkRecord& record) {
-  RELIT_TRY(require(record.segment_index < limits::kSegments, "segment_index is too large"));
+  RELIT_REQUIRE(record.segment_index < limits::kSegments, "segment_index is too large");
   RELIT_TRY(one_to(record.packets.size(), limits::kPacketsPerChunk, "number of packets"));
   std::uint64_t offset = 0;
   std::vector<std::int64_t> times;
   times.reserve(record.packets.size());
   for (const Packet& p : record.packets) {
-    RELIT_TRY(require(p.pts >= 0 && static_cast<std::uint64_t>(p.pts) < limits::kFrames,
-                      "packet.pts is outside the clip"));
+    RELIT_REQUIRE(p.pts >= 0 && static_cast<std::uint64_t>(p.pts) < limits::kFrames,
+                  "packet.pts is outside the clip");
     RELIT_TRY(at_most(p.size, limits::kRecordBytes, "packet.size"));
-    RELIT_TRY(require(p.offset == offset, "packets do not follow one another in the data"));
+    RELIT_REQUIRE(p.offset == offset, "packets do not follow one another in the data");
     offset += p.size;
     times.push_back(p.pts);
   }
-  RELIT_TRY(require(offset == record.data.size(), "the packets have " + std::to_string(offset) +
-                                                      " bytes, the data " +
-                                                      std::to_string(record.data.size())));
+  RELIT_REQUIRE(offset == record.data.size(), "the packets have " + std::to_string(offset) +
+                                                  " bytes, the data " +
+                                                  std::to_string(record.data.size()));
   std::ranges::sort(times);
-  return require(std::ranges::adjacent_find(times) == times.end(), "two packets with the same pts");
+  RELIT_REQUIRE(std::ranges::adjacent_find(times) == times.end(), "two packets with the same pts");
+  return {};
 }
 
 std::vector<std::uint8_t> serialize(const IndexRecord& record) {
@@ -230,14 +231,14 @@ Status validate(const IndexRecord& record) {
   RELIT_TRY(at_most(record.segments.size(), limits::kSegments, "number of segments"));
   const IndexRecord::Entry* previous = nullptr;
   for (const auto& e : record.segments) {
-    RELIT_TRY(require(e.segment_index < limits::kSegments, "segment_index is too large"));
+    RELIT_REQUIRE(e.segment_index < limits::kSegments, "segment_index is too large");
     RELIT_TRY(frame_range(e.first_frame, e.frame_count));
     RELIT_TRY(at_most(e.first_tick, limits::kTicks, "first_tick"));
-    RELIT_TRY(require(e.offset % kRecordAlignment == 0 && e.offset >= kSignature.size(),
-                      "offset " + std::to_string(e.offset) + " is not that of a record"));
-    RELIT_TRY(require(previous == nullptr || (previous->segment_index < e.segment_index &&
-                                              previous->offset < e.offset),
-                      "segments are not in the order of the file"));
+    RELIT_REQUIRE(e.offset % kRecordAlignment == 0 && e.offset >= kSignature.size(),
+                  "offset " + std::to_string(e.offset) + " is not that of a record");
+    RELIT_REQUIRE(previous == nullptr ||
+                      (previous->segment_index < e.segment_index && previous->offset < e.offset),
+                  "segments are not in the order of the file");
     previous = &e;
   }
   return {};
@@ -263,14 +264,15 @@ Result<EndRecord> parse_end(std::span<const std::uint8_t> payload) {
 }
 
 Status validate(const EndRecord& record) {
-  RELIT_TRY(require(record.file_bytes % kRecordAlignment == 0 &&
-                        record.file_bytes >= kSignature.size() + record_bytes(kEndPayloadBytes),
-                    "file_bytes is not the length of a file"));
+  RELIT_REQUIRE(record.file_bytes % kRecordAlignment == 0 &&
+                    record.file_bytes >= kSignature.size() + record_bytes(kEndPayloadBytes),
+                "file_bytes is not the length of a file");
   const std::uint64_t end = record.file_bytes - record_bytes(kEndPayloadBytes);
-  RELIT_TRY(require(record.index_offset % kRecordAlignment == 0 && record.index_offset <= end,
-                    "index_offset does not lie in the file before the end record"));
-  return require(record.copies_offset % kRecordAlignment == 0 && record.copies_offset <= end,
-                 "copies_offset does not lie in the file before the end record");
+  RELIT_REQUIRE(record.index_offset % kRecordAlignment == 0 && record.index_offset <= end,
+                "index_offset does not lie in the file before the end record");
+  RELIT_REQUIRE(record.copies_offset % kRecordAlignment == 0 && record.copies_offset <= end,
+                "copies_offset does not lie in the file before the end record");
+  return {};
 }
 
 }  // namespace relit::container

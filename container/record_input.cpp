@@ -11,8 +11,6 @@ namespace {
 
 /// A header's length is believed only as far as bytes really come.
 constexpr std::size_t kFirstReadBytes = std::size_t{1} << 20;
-/// Below this, reading on is cheaper than seeking: over HTTP a seek is a new connection.
-constexpr std::uint64_t kLeastSeekBytes = std::uint64_t{1} << 16;
 constexpr std::size_t kScanBytes = std::size_t{1} << 16;
 /// How often, on the average, a byte may be gone over again.
 constexpr std::uint64_t kMostRewound = 8;
@@ -23,6 +21,19 @@ constexpr std::size_t kKeptBytes = std::size_t{1} << 24;
 Error truncated(std::uint64_t wanted, std::uint64_t got) {
   return {ErrorCode::kTruncated,
           "the data end after " + std::to_string(got) + " of " + std::to_string(wanted) + " bytes"};
+}
+
+FramingDamage source_damage(const Error& error) {
+  return error.code == ErrorCode::kTruncated ? FramingDamage::kTruncated : FramingDamage::kSource;
+}
+
+/// Why decode_header() refused the bytes.
+FramingDamage header_damage(std::span<const std::uint8_t, kRecordHeaderBytes> bytes,
+                            const Error& error) {
+  if (error.code == ErrorCode::kLimit) return FramingDamage::kLength;
+  std::uint32_t stored = 0;
+  for (std::size_t i = 0; i < 4; ++i) stored |= std::uint32_t{bytes[20 + i]} << (8 * i);
+  return stored == crc32(bytes.first<20>()) ? FramingDamage::kType : FramingDamage::kHeaderChecksum;
 }
 
 }  // namespace
@@ -60,6 +71,7 @@ Status RecordInput::read_raw(std::span<std::uint8_t> out) {
 }
 
 Unexpected RecordInput::lose(Error error) {
+  damage_ = source_damage(error);
   lost_ = error;
   return Unexpected{std::move(error)};
 }
@@ -114,7 +126,12 @@ Result<std::optional<RecordHeader>> RecordInput::peek() {
   if (!header) {
     suspect_.insert(suspect_.end(), header_bytes_.begin(),
                     header_bytes_.begin() + static_cast<std::ptrdiff_t>(*got));
-    return lose(std::move(header).error());
+    const FramingDamage damage = *got < kRecordHeaderBytes
+                                     ? FramingDamage::kTruncated
+                                     : header_damage(header_bytes_, header.error());
+    auto failure = lose(std::move(header).error());
+    damage_ = damage;
+    return failure;
   }
   drop_suspect();
   header_ = *header;
@@ -126,30 +143,39 @@ Result<std::span<const std::uint8_t>> RecordInput::payload() {
   header_.reset();
   const auto size = static_cast<std::size_t>(header.payload_bytes);
   const std::size_t total = size + padding_after(size);
-  if (payload_.capacity() > kKeptBytes) payload_ = {};
-  payload_.clear();
-
+  if (payload_.size() > kKeptBytes) payload_ = {};
+  std::size_t done = 0;
   const auto suspect = [&] {
     suspect_.assign(header_bytes_.begin(), header_bytes_.end());
-    suspect_.insert(suspect_.end(), payload_.begin(), payload_.end());
+    suspect_.insert(suspect_.end(), payload_.begin(),
+                    payload_.begin() + static_cast<std::ptrdiff_t>(done));
   };
-  while (payload_.size() < total) {
-    const std::size_t done = payload_.size();
-    payload_.resize(std::min(total, std::max(kFirstReadBytes, 2 * done)));
-    auto got = read_fully(std::span(payload_).subspan(done));
+  // A length is believed where the source can hold it; else memory follows what arrives.
+  const auto source_bytes = source_->size();
+  const bool believed =
+      source_bytes && total <= *source_bytes - std::min(*source_bytes, offset_bytes());
+  while (done < total) {
+    const std::size_t goal =
+        believed ? total : std::min(total, std::max(kFirstReadBytes, 2 * done));
+    // Only growth is paid for: what a longer record left behind is overwritten.
+    if (payload_.size() < goal) payload_.resize(goal);
+    auto got = read_fully(std::span(payload_).subspan(done, goal - done));
     // How much arrived before the source failed is unknown, so there is nothing to search later.
     if (!got) return lose(std::move(got).error());
-    if (done + *got == payload_.size()) continue;
-    payload_.resize(done + *got);
+    done += *got;
+    if (done == goal) continue;
     suspect();
-    return lose(truncated(total, payload_.size()));
+    return lose(truncated(total, done));
   }
-  const auto bytes = std::span<const std::uint8_t>(payload_);
+  const auto bytes = std::span<const std::uint8_t>(payload_).first(total);
+  if (!verify_) return bytes.first(size);
+  const bool intact = crc32(bytes.first(size)) == header.payload_crc;
   const bool padded = std::ranges::all_of(bytes.subspan(size), [](auto b) { return b == 0; });
-  if (verify_ && (!padded || crc32(bytes.first(size)) != header.payload_crc)) {
+  if (!intact || !padded) {
     suspect();
+    damage_ = intact ? FramingDamage::kPadding : FramingDamage::kPayloadChecksum;
     return fail(ErrorCode::kCorrupt,
-                padded ? "the payload does not match its checksum" : "the padding is not zero");
+                intact ? "the padding is not zero" : "the payload does not match its checksum");
   }
   return bytes.first(size);
 }

@@ -13,11 +13,26 @@
 
 namespace relit::container {
 
+/// Why RecordInput could not give a header or a payload.
+enum class FramingDamage : std::uint8_t {
+  kNone,
+  kHeaderChecksum,
+  kType,    ///< the checksum is right, the type is none
+  kLength,  ///< beyond the limits
+  kPayloadChecksum,
+  kPadding,
+  kTruncated,
+  kSource,  ///< the source itself failed
+};
+
 /// Cuts a byte source into records: the part of the Reader that knows framing and checksums but no
 /// record. Keeps the bytes of a record that turned out damaged, so that resync() can look for a
 /// segment inside them even where the source cannot go back. One thread at a time.
 class RecordInput {
  public:
+  /// Fewer bytes than this are read through rather than sought over: over HTTP a seek is a request.
+  static constexpr std::uint64_t kLeastSeekBytes = 4096;
+
   /// `source` outlives the input and is moved by nobody else; it stands at `offset_bytes`.
   RecordInput(ByteSource& source, std::uint64_t offset_bytes, bool verify_checksums)
       : source_(&source), source_offset_(offset_bytes), verify_(verify_checksums) {}
@@ -40,6 +55,9 @@ class RecordInput {
   /// Passes over bytes at the next record's place; the source is moved only by the next peek().
   void skip_bytes(std::uint64_t bytes) { pending_skip_ += bytes; }
 
+  /// What the last error of peek() or payload() was about.
+  [[nodiscard]] FramingDamage damage() const { return damage_; }
+
   /// Declares the framing lost at the record that peek() gave.
   void lose_framing(Error error) { lost_ = std::move(error); }
   [[nodiscard]] bool framing_lost() const { return lost_.has_value(); }
@@ -51,6 +69,11 @@ class RecordInput {
 
   /// Goes to a record at `offset_bytes`. Errors: the source's.
   Status seek(std::uint64_t offset_bytes);
+
+  /// ByteSource::expect().
+  void expect(std::uint64_t begin_bytes, std::uint64_t end_bytes) {
+    source_->expect(begin_bytes, end_bytes);
+  }
 
   /// Where the next record starts, or the one that peek() gave.
   [[nodiscard]] std::uint64_t offset_bytes() const;
@@ -82,6 +105,7 @@ class RecordInput {
   std::vector<std::uint8_t> payload_;
   std::vector<std::uint8_t> suspect_;  ///< what was read of the damaged record, up to here
   std::optional<Error> lost_;
+  FramingDamage damage_ = FramingDamage::kNone;
   std::uint64_t rewound_bytes_ = 0;
   std::uint64_t dropped_bytes_ = 0;
 };

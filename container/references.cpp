@@ -18,13 +18,14 @@ std::string label(const char* what, std::uint32_t id) {
 
 /// Notes a new id, refuses a used one and too many of them.
 Status note(std::set<std::uint32_t>& ids, std::uint32_t id, std::size_t limit, const char* what) {
-  RELIT_TRY(require(ids.insert(id).second, label(what, id) + " exists twice"));
+  RELIT_REQUIRE(ids.insert(id).second, label(what, id) + " exists twice");
   return at_most(ids.size(), limit, "number of records of this kind");
 }
 
 template <class Ids>
 Status exists(const Ids& ids, std::uint32_t id, const char* what) {
-  return require(ids.count(id) != 0, label(what, id) + " does not exist");
+  RELIT_REQUIRE(ids.count(id) != 0, label(what, id) + " does not exist");
+  return {};
 }
 
 }  // namespace
@@ -34,13 +35,13 @@ Status ReferenceChecker::add(const ClipRecord& record) {
   clip.frame_count = record.frame_count, clip.duration_ticks = record.duration_ticks;
   clip.ticks_per_s =
       static_cast<double>(record.tick_rate.num) / static_cast<double>(record.tick_rate.den);
-  RELIT_TRY(require(clips_.emplace(record.id, std::move(clip)).second,
-                    label("clip", record.id) + " exists twice"));
+  RELIT_REQUIRE(clips_.emplace(record.id, std::move(clip)).second,
+                label("clip", record.id) + " exists twice");
   return at_most(clips_.size(), limits::kClips, "number of clips");
 }
 
 Status ReferenceChecker::add(const ImageRecord& record) {
-  RELIT_TRY(require(record.id <= 0x7FFFFFFF, label("image", record.id) + " exceeds 2147483647"));
+  RELIT_REQUIRE(record.id <= 0x7FFFFFFF, label("image", record.id) + " exceeds 2147483647");
   return note(images_, record.id, limits::kImages, "image");
 }
 
@@ -72,22 +73,21 @@ Status ReferenceChecker::add(const SkeletonRecord& record) {
 Status ReferenceChecker::add(const PoseTrackRecord& record) {
   RELIT_TRY(exists(clips_, record.clip_id, "clip"));
   Clip& clip = clips_.at(record.clip_id);
-  RELIT_TRY(require(!clip.has_pose, label("clip", record.clip_id) + " has two pose tracks"));
+  RELIT_REQUIRE(!clip.has_pose, label("clip", record.clip_id) + " has two pose tracks");
   clip.has_pose = true;
   RELIT_TRY(add_track(record.track_id, clip));
   for (const RestTrs& t : record.rest)
-    RELIT_TRY(require(t.node < nodes_, label("node", t.node) + " does not exist"));
+    RELIT_REQUIRE(t.node < nodes_, label("node", t.node) + " does not exist");
   for (const PoseChannel& c : record.channels) {
     if (c.target == ChannelTarget::kMorphWeight)
-      RELIT_TRY(
-          require(c.index < morph_weights_, label("morph weight", c.index) + " does not exist"));
+      RELIT_REQUIRE(c.index < morph_weights_, label("morph weight", c.index) + " does not exist");
     else
-      RELIT_TRY(require(c.index < nodes_, label("node", c.index) + " does not exist"));
+      RELIT_REQUIRE(c.index < nodes_, label("node", c.index) + " does not exist");
   }
   for (const VertexRange& v : record.vertex_ranges) RELIT_TRY(exists(meshes_, v.mesh_id, "mesh"));
-  return require(
-      record.kind != PoseKind::kVertices || record.vertex_ranges.size() == meshes_.size(),
-      "a track of vertices needs one vertex range for each mesh");
+  RELIT_REQUIRE(record.kind != PoseKind::kVertices || record.vertex_ranges.size() == meshes_.size(),
+                "a track of vertices needs one vertex range for each mesh");
+  return {};
 }
 
 Status ReferenceChecker::add(const ModelRecord& record) {
@@ -98,8 +98,8 @@ Status ReferenceChecker::add(const ModelRecord& record) {
                     record.height,
                     record.prediction_plane,
                     0};
-  RELIT_TRY(require(models_.emplace(record.id, model).second,
-                    label("model", record.id) + " exists twice"));
+  RELIT_REQUIRE(models_.emplace(record.id, model).second,
+                label("model", record.id) + " exists twice");
   return at_most(models_.size(), limits::kLayers, "number of models");
 }
 
@@ -116,34 +116,33 @@ Status ReferenceChecker::add(const LayerRecord& record) {
   model.planes += static_cast<std::uint32_t>(record.planes.size());
   RELIT_TRY(at_most(model.planes, limits::kPlanes, "number of planes of the model"));
   for (const PlaneRecord& p : record.planes) {
-    RELIT_TRY(
-        require(p.mantissa_rect.width == model.width && p.mantissa_rect.height == model.height,
-                "a plane does not have the size of the light map"));
+    RELIT_REQUIRE(p.mantissa_rect.width == model.width && p.mantissa_rect.height == model.height,
+                  "a plane does not have the size of the light map");
     for (const MatrixEntry& m : p.matrix)
-      RELIT_TRY(require(m.coefficient < model.coefficients,
-                        "matrix.coefficient " + std::to_string(m.coefficient) +
-                            " is not one of the model's " + std::to_string(model.coefficients)));
+      RELIT_REQUIRE(m.coefficient < model.coefficients,
+                    "matrix.coefficient " + std::to_string(m.coefficient) +
+                        " is not one of the model's " + std::to_string(model.coefficients));
   }
   return {};
 }
 
 Status ReferenceChecker::add_track(std::uint32_t track_id, Clip& clip) {
-  RELIT_TRY(require(tracks_.insert(track_id).second, label("track", track_id) + " is used twice"));
+  RELIT_REQUIRE(tracks_.insert(track_id).second, label("track", track_id) + " is used twice");
   clip.tracks.push_back(track_id);
   return at_most(clip.tracks.size(), limits::kChunksPerSegment, "number of tracks of the clip");
 }
 
 Status ReferenceChecker::finish() const {
-  RELIT_TRY(require(!clips_.empty(), "the file has no clip"));
-  RELIT_TRY(require(!joints_used_ || palette_ > 0, "a mesh has joints, but there is no palette"));
-  RELIT_TRY(require(morph_weights_used_ <= morph_weights_,
-                    "a mesh uses " + std::to_string(morph_weights_used_) +
-                        " morph weights, the skeleton has " + std::to_string(morph_weights_)));
+  RELIT_REQUIRE(!clips_.empty(), "the file has no clip");
+  RELIT_REQUIRE(!joints_used_ || palette_ > 0, "a mesh has joints, but there is no palette");
+  RELIT_REQUIRE(morph_weights_used_ <= morph_weights_,
+                "a mesh uses " + std::to_string(morph_weights_used_) +
+                    " morph weights, the skeleton has " + std::to_string(morph_weights_));
   for (const auto& [id, model] : models_)
-    RELIT_TRY(require(model.prediction_plane < static_cast<std::int64_t>(model.planes),
-                      label("model", id) + " predicts from plane " +
-                          std::to_string(model.prediction_plane) + " of " +
-                          std::to_string(model.planes)));
+    RELIT_REQUIRE(model.prediction_plane < static_cast<std::int64_t>(model.planes),
+                  label("model", id) + " predicts from plane " +
+                      std::to_string(model.prediction_plane) + " of " +
+                      std::to_string(model.planes));
   for (const auto& [id, clip] : clips_) RELIT_TRY(check_rate(id, clip));
   return {};
 }
@@ -186,18 +185,18 @@ std::span<const std::uint32_t> ReferenceChecker::tracks(std::uint32_t clip_id) c
 }
 
 Status check_chunk(const SegmentRecord& segment, const ChunkRecord& chunk) {
-  RELIT_TRY(require(chunk.segment_index == segment.index,
-                    "the chunk belongs to segment " + std::to_string(chunk.segment_index) +
-                        ", not to " + std::to_string(segment.index)));
-  RELIT_TRY(require(!chunk.packets.empty() && chunk.packets.front().key,
-                    "the first packet of a segment must be a key"));
+  RELIT_REQUIRE(chunk.segment_index == segment.index,
+                "the chunk belongs to segment " + std::to_string(chunk.segment_index) +
+                    ", not to " + std::to_string(segment.index));
+  RELIT_REQUIRE(!chunk.packets.empty() && chunk.packets.front().key,
+                "the first packet of a segment must be a key");
   const auto first = static_cast<std::int64_t>(segment.first_frame);
-  RELIT_TRY(require(chunk.packets.front().pts == first,
-                    "the first packet has pts " + std::to_string(chunk.packets.front().pts) +
-                        ", the segment starts with frame " + std::to_string(first)));
+  RELIT_REQUIRE(chunk.packets.front().pts == first,
+                "the first packet has pts " + std::to_string(chunk.packets.front().pts) +
+                    ", the segment starts with frame " + std::to_string(first));
   for (const Packet& p : chunk.packets)
-    RELIT_TRY(require(p.pts >= first && p.pts < first + std::int64_t{segment.frame_count},
-                      "packet of frame " + std::to_string(p.pts) + " lies outside the segment"));
+    RELIT_REQUIRE(p.pts >= first && p.pts < first + std::int64_t{segment.frame_count},
+                  "packet of frame " + std::to_string(p.pts) + " lies outside the segment");
   return {};
 }
 

@@ -58,52 +58,50 @@ Status Writer::add(const LayerRecord& record) { return add_static(types::kLayer,
 Status Writer::add_ancillary(RecordType type, std::span<const std::uint8_t> payload) {
   const auto write = [&]() -> Status {
     if (closed_) return enter(order_);
-    RELIT_TRY(require(is_well_formed(type) && !is_critical(type),
-                      "'" + type_name(type) + "' is not the type of an ancillary record"));
+    RELIT_REQUIRE(is_well_formed(type) && !is_critical(type),
+                  "'" + type_name(type) + "' is not the type of an ancillary record");
     return write_record(type, payload);
   };
   return settle(write(), "ancillary record");
 }
 
-Status Writer::check_segment(const SegmentInfo& info,
-                             const std::vector<ChunkRecord>& chunks) const {
-  const auto frame_count = references_.frame_count(info.clip_id);
-  RELIT_TRY(
-      require(frame_count.has_value(), "clip " + std::to_string(info.clip_id) + " does not exist"));
-  const auto done = written_.find(info.clip_id);
-  const std::uint64_t expected = done == written_.end() ? 0 : done->second.frames;
-  RELIT_TRY(require(info.first_frame == expected,
-                    "the segment starts with frame " + std::to_string(info.first_frame) +
-                        ", the next one of its clip is " + std::to_string(expected)));
-  RELIT_TRY(
-      require(info.frame_count <= *frame_count - expected,
-              "the segment goes beyond the clip's " + std::to_string(*frame_count) + " frames"));
-  const auto tracks = references_.tracks(info.clip_id);
+Status Writer::check_tracks(std::uint32_t clip_id, const std::vector<ChunkRecord>& chunks) const {
+  const auto tracks = references_.tracks(clip_id);
   for (const ChunkRecord& chunk : chunks)
-    RELIT_TRY(require(std::ranges::find(tracks, chunk.track_id) != tracks.end(),
-                      "track " + std::to_string(chunk.track_id) + " is not one of the clip's"));
-  for (const std::uint32_t track : tracks)
-    RELIT_TRY(require(std::ranges::count(chunks, track, &ChunkRecord::track_id) == 1,
-                      "the segment needs exactly one chunk for track " + std::to_string(track)));
+    RELIT_REQUIRE(std::ranges::find(tracks, chunk.track_id) != tracks.end(),
+                  "track " + std::to_string(chunk.track_id) + " is not one of the clip's");
+  for (const std::uint32_t track : tracks) {
+    const auto count = std::ranges::count(chunks, track, &ChunkRecord::track_id);
+    RELIT_REQUIRE(count == 1 || (count == 0 && options_.gaps),
+                  "the segment needs exactly one chunk for track " + std::to_string(track));
+  }
   return {};
+}
+
+/// What has been written of a clip, for the segment that comes next.
+Result<SegmentOrder*> Writer::order_of_clip(std::uint32_t clip_id) {
+  const auto frames = references_.frame_count(clip_id);
+  const auto ticks = references_.duration_ticks(clip_id);
+  RELIT_REQUIRE(frames && ticks, "clip " + std::to_string(clip_id) + " does not exist");
+  return &written_.try_emplace(clip_id, *frames, *ticks).first->second;
 }
 
 Status Writer::write_segment(const SegmentInfo& info, std::vector<ChunkRecord> chunks) {
   const auto write = [&]() -> Status {
     if (order_ < order_of(types::kSegment)) RELIT_TRY(references_.finish());
     RELIT_TRY(enter(order_of(types::kSegment)));
-    RELIT_TRY(check_segment(info, chunks));
+    RELIT_ASSIGN(SegmentOrder* const written, order_of_clip(info.clip_id));
+    RELIT_TRY(check_tracks(info.clip_id, chunks));
     const auto tracks = references_.tracks(info.clip_id);
     const auto place = [&](const ChunkRecord& c) { return std::ranges::find(tracks, c.track_id); };
     std::ranges::sort(chunks, {}, place);
 
-    Written& written = written_[info.clip_id];
     SegmentRecord segment;
     segment.index = static_cast<std::uint32_t>(index_.segments.size());
     segment.clip_id = info.clip_id;
     segment.first_frame = info.first_frame;
     segment.frame_count = info.frame_count;
-    segment.first_tick = written.ticks;
+    segment.first_tick = info.first_tick.value_or(written->next_tick());
     segment.durations = info.durations;
     // What it says without a list need not be listed.
     if (std::ranges::all_of(segment.durations, [](std::uint32_t t) { return t == 1; }) &&
@@ -119,12 +117,15 @@ Status Writer::write_segment(const SegmentInfo& info, std::vector<ChunkRecord> c
       chunk.data = {};
     }
     RELIT_TRY(validate(segment));
+    RELIT_TRY(written->check(segment));
+    RELIT_REQUIRE(options_.gaps || segment.first_frame == written->next_frame(),
+                  "the segment starts with frame " + std::to_string(segment.first_frame) +
+                      ", the next one of its clip is " + std::to_string(written->next_frame()));
     index_.segments.push_back({segment.index, segment.clip_id, segment.first_frame,
                                segment.frame_count, offset_, segment.first_tick});
     RELIT_TRY(write_record(types::kSegment, serialize(segment)));
     for (const auto& payload : payloads) RELIT_TRY(write_record(types::kChunk, payload));
-    written.frames = info.first_frame + info.frame_count;
-    written.ticks += duration_ticks(segment);
+    written->accept(segment);
     return {};
   };
   return settle(write(), "segment");
@@ -152,18 +153,14 @@ Status Writer::finish() {
 }
 
 Status Writer::check_complete() const {
+  if (options_.gaps) return {};
   for (const std::uint32_t clip : references_.clips()) {
     if (references_.tracks(clip).empty()) continue;
     const auto done = written_.find(clip);
-    const Written written = done == written_.end() ? Written{} : done->second;
-    RELIT_TRY(require(written.frames == references_.frame_count(clip),
-                      "clip " + std::to_string(clip) + " has segments for " +
-                          std::to_string(written.frames) + " of its " +
-                          std::to_string(*references_.frame_count(clip)) + " frames"));
-    RELIT_TRY(require(written.ticks == references_.duration_ticks(clip),
-                      "the frames of clip " + std::to_string(clip) + " last " +
-                          std::to_string(written.ticks) + " of its " +
-                          std::to_string(*references_.duration_ticks(clip)) + " ticks"));
+    const std::uint64_t frames = done == written_.end() ? 0 : done->second.next_frame();
+    RELIT_REQUIRE(frames == references_.frame_count(clip),
+                  "clip " + std::to_string(clip) + " has segments for " + std::to_string(frames) +
+                      " of its " + std::to_string(*references_.frame_count(clip)) + " frames");
   }
   return {};
 }
@@ -186,10 +183,9 @@ Status Writer::write_bytes(std::span<const std::uint8_t> bytes) {
 Status Writer::enter(int order) {
   if (closed_) return fail(ErrorCode::kInvalid, "the writer is finished, or failed before");
   const bool once = order == order_of(types::kSkeleton) && order_ == order;
-  RELIT_TRY(
-      require(order >= order_ && !once, once ? "a file has one skeleton"
-                                             : "this record comes too late: the order is "
-                                               "CLIP IMAG MATL MESH SKEL POSE MODL LAYR SEGM"));
+  RELIT_REQUIRE(order >= order_ && !once, once ? "a file has one skeleton"
+                                               : "this record comes too late: the order is "
+                                                 "CLIP IMAG MATL MESH SKEL POSE MODL LAYR SEGM");
   order_ = order;
   return {};
 }

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,7 @@
 #include "container/framing.hpp"
 #include "container/records.hpp"
 #include "container/references.hpp"
+#include "container/segment_order.hpp"
 
 namespace relit::container {
 
@@ -20,12 +22,17 @@ struct SegmentInfo {
   std::uint64_t first_frame = 0;
   std::uint32_t frame_count = 0;
   std::vector<std::uint32_t> durations = {};  ///< ticks of each frame; empty: one tick each
+  /// When the first frame is shown; nothing: when the clip's segment before this one ends.
+  std::optional<std::uint64_t> first_tick = {};
 };
 
 struct WriterOptions {
   /// Stores HEAD and all static records a second time, behind the segments, so that one hit cannot
   /// cost the file. Players never read them unless the first ones are damaged.
   bool copies = true;
+  /// Segments may lack tracks, and clips segments. For what is left of other files: nobody else has
+  /// a reason.
+  bool gaps = false;
 };
 
 /// Writes a .relit file from front to back:
@@ -57,10 +64,12 @@ class Writer {
 
   /// A segment with a chunk for every track of its clip, in any order: they are written in the
   /// order of the tracks' declaration. The segments of a clip follow one another without gaps from
-  /// frame 0; those of several clips may be mixed. `segment_index` of the chunks is filled in.
+  /// frame 0 (but see WriterOptions::gaps); those of several clips may be mixed. `segment_index` of
+  /// the chunks is filled in.
   Status write_segment(const SegmentInfo& info, std::vector<ChunkRecord> chunks);
 
-  /// Writes copies, index and end record. Every clip that has tracks must be complete.
+  /// Writes copies, index and end record. Every clip that has tracks must be complete,
+  /// unless there may be gaps.
   Status finish();
 
   [[nodiscard]] std::uint64_t bytes_written() const { return offset_; }
@@ -70,7 +79,8 @@ class Writer {
 
   template <class R>
   Status add_static(RecordType type, const R& record);
-  Status check_segment(const SegmentInfo& info, const std::vector<ChunkRecord>& chunks) const;
+  Status check_tracks(std::uint32_t clip_id, const std::vector<ChunkRecord>& chunks) const;
+  Result<SegmentOrder*> order_of_clip(std::uint32_t clip_id);
   Status write_record(RecordType type, std::span<const std::uint8_t> payload,
                       std::uint32_t record_flags = 0);
   Status write_static(RecordType type, std::vector<std::uint8_t> payload);
@@ -87,11 +97,7 @@ class Writer {
   bool closed_ = false;
   std::uint64_t static_bytes_ = 0;
   ReferenceChecker references_;
-  struct Written {
-    std::uint64_t frames = 0;
-    std::uint64_t ticks = 0;
-  };
-  std::map<std::uint32_t, Written> written_;  ///< by clip
+  std::map<std::uint32_t, SegmentOrder> written_;  ///< by clip
   struct Stored {
     RecordType type;
     std::vector<std::uint8_t> payload;

@@ -14,6 +14,7 @@ extern "C" {
 #include <utility>
 
 #include "container/base/limits.hpp"
+#include "decoders/codec_private.hpp"
 
 namespace relit::decoders {
 namespace {
@@ -87,8 +88,15 @@ Status check_format(const VideoFormat& format) {
   if (static_cast<int>(format.chroma) > static_cast<int>(container::Chroma::k444)) {
     return fail(ErrorCode::kInvalid, track_name(format) + ": unknown chroma format");
   }
-  if (format.codec_private.size() > limits::kDecompressedBytes / 16) {
-    return fail(ErrorCode::kLimit, track_name(format) + ": codec_private is too long");
+  if (format.codec_private.size() > limits::kCodecPrivateBytes) {
+    return fail(ErrorCode::kLimit, track_name(format) + ": codec_private has " +
+                                       std::to_string(format.codec_private.size()) +
+                                       " bytes, allowed are " +
+                                       std::to_string(limits::kCodecPrivateBytes));
+  }
+  if (const Status checked = check_private(format.codec, format.codec_private); !checked) {
+    return fail(checked.error().code,
+                track_name(format) + ": codec_private: " + checked.error().message);
   }
   return {};
 }
@@ -196,6 +204,8 @@ Result<VideoDecoder> VideoDecoder::open(const VideoFormat& format, int threads) 
   context.thread_count = std::clamp(threads, 1, 64);
   context.thread_type = FF_THREAD_FRAME | FF_THREAD_SLICE;
   context.idct_algo = FF_IDCT_SIMPLE;
+  // Without it x86 takes approximations of MPEG-4's rounded half samples.
+  context.flags |= AV_CODEC_FLAG_BITEXACT;
   context.error_concealment = 0;
   context.err_recognition = AV_EF_CRCCHECK | AV_EF_BITSTREAM | AV_EF_BUFFER | AV_EF_EXPLODE;
   context.workaround_bugs = 0;
@@ -222,12 +232,14 @@ Status VideoDecoder::reopen() {
 
 Status VideoDecoder::send(std::span<const std::uint8_t> packet, std::int64_t pts, bool key) {
   const auto where = [&] { return track_name(format_) + ", frame " + std::to_string(pts); };
-  // An empty packet would mean "drain" to libavcodec.
-  if (packet.empty()) return fail(ErrorCode::kCorrupt, where() + ": an empty packet");
   if (packet.size() > limits::kRecordBytes) {
     return fail(ErrorCode::kLimit, where() + ": a packet of " + std::to_string(packet.size()) +
                                        " bytes, allowed are " +
                                        std::to_string(limits::kRecordBytes));
+  }
+  // Among others an empty packet, which would mean "drain" to libavcodec.
+  if (const Status checked = check_packet(format_.codec, packet); !checked) {
+    return fail(checked.error().code, where() + ": " + checked.error().message);
   }
   if (format_.codec == "ffv1" && !ffv1_intact(packet)) {
     return fail(ErrorCode::kCorrupt, where() +

@@ -51,6 +51,7 @@ class VideoFrame {
 };
 
 /// One video stream. Not thread-safe; different decoders may run on different threads.
+/// codec_private and packets have to have the forms of FORMAT.md, section 3.4.
 /// MPEG-4 always uses the simple IDCT, so that every machine decodes the same samples. FFV1 has to
 /// be of version 3 with slice CRCs, which are checked.
 class VideoDecoder {

@@ -2,39 +2,21 @@
 #include "player/clip_reader.hpp"
 
 #include <algorithm>
+#include <iterator>
+#include <utility>
 
 #include "container/base/out_of_memory.hpp"
 
+#include "player/video_tracks.hpp"
+
 namespace relit::player {
-namespace {
-
-// A number that is not a clip's name counts clips.
-const container::ClipRecord* find_clip(const std::vector<container::ClipRecord>& clips,
-                                       const std::string& wanted) {
-  if (wanted.empty()) return &clips.front();
-  for (const container::ClipRecord& clip : clips) {
-    if (clip.name == wanted) return &clip;
-  }
-  if (wanted.size() > 6 || wanted.find_first_not_of("0123456789") != std::string::npos)
-    return nullptr;
-  const auto number = static_cast<std::size_t>(std::stoul(wanted));
-  return number < clips.size() ? &clips[number] : nullptr;
-}
-
-}  // namespace
 
 Unexpected ClipReader::in_file(const Error& error) const {
   return fail(error.code, name_ + ": " + error.message);
 }
 
 Status ClipReader::choose_clip(const std::string& wanted) {
-  const container::ClipRecord* clip = find_clip(contents_.clips, wanted);
-  if (clip == nullptr) {
-    std::string names;
-    for (const container::ClipRecord& c : contents_.clips)
-      names += (names.empty() ? "" : ", ") + c.name;
-    return fail(ErrorCode::kNotFound, name_ + ": no clip \"" + wanted + "\"; there are: " + names);
-  }
+  RELIT_ASSIGN(const container::ClipRecord* clip, find_clip(contents_, wanted, name_));
   clip_ = *clip;
   timeline_ = container::Timeline(clip_);
   const auto model =
@@ -70,7 +52,9 @@ Result<ClipReader> ClipReader::open(std::unique_ptr<container::ByteSource> sourc
 
 Result<ClipReader> ClipReader::open_clip(std::unique_ptr<container::ByteSource> source,
                                          const std::string& name, const ClipOptions& options) {
-  auto reader = container::Reader::open(std::move(source));
+  container::ReaderOptions reading;
+  reading.sparing = options.spares_bytes();
+  auto reader = container::Reader::open(std::move(source), reading);
   if (!reader) return fail(reader.error().code, name + ": " + reader.error().message);
   ClipReader clip(std::move(*reader), name);
   auto contents = container::load_static(clip.reader_);
@@ -91,6 +75,12 @@ Result<ClipReader> ClipReader::open_clip(std::unique_ptr<container::ByteSource> 
     if (!planes) return clip.in_file(planes.error());
     clip.planes_ = std::move(*planes);
   }
+  // Pose, mantissas and exponents of the most important layer.
+  clip.impatient_ = options.impatient;
+  const bool exponents = tracks.size() > 1 && clip.layers_.front().has_exponents;
+  clip.first_picture_.assign(
+      tracks.begin(),
+      tracks.begin() + std::min<std::ptrdiff_t>(std::ssize(tracks), exponents ? 3 : 2));
   std::sort(tracks.begin(), tracks.end());
   clip.tracks_ = tracks;
   clip.reader_.set_wanted_tracks(std::move(tracks));
@@ -121,6 +111,12 @@ PlaybackLoss ClipReader::loss() const {
   return loss;
 }
 
+void ClipReader::note_arrival(std::uint32_t track_id) {
+  // Chunks come in the order that the segment lists: after the last one it need not be waited for.
+  if (track_id == last_chunk_) complete_end_ = segment_->first_frame + segment_->frame_count;
+  std::erase(missing_, track_id);
+}
+
 Status ClipReader::take(container::Record record) {
   if (auto* segment = std::get_if<container::SegmentRecord>(&record.body)) {
     if (segment_) complete_end_ = segment_->first_frame + segment_->frame_count;
@@ -140,6 +136,7 @@ Status ClipReader::take(container::Record record) {
       return {};
     }
     segment_ = std::move(*segment);
+    missing_ = first_picture_;
     for (const auto& chunk : segment_->chunks) {
       if (std::binary_search(tracks_.begin(), tracks_.end(), chunk.track_id))
         last_chunk_ = chunk.track_id;
@@ -148,8 +145,7 @@ Status ClipReader::take(container::Record record) {
   }
   auto* chunk = std::get_if<container::ChunkRecord>(&record.body);
   if (chunk == nullptr || !segment_) return {};
-  // Chunks come in the order that the segment lists: after the last one it need not be waited for.
-  if (chunk->track_id == last_chunk_) complete_end_ = segment_->first_frame + segment_->frame_count;
+  note_arrival(chunk->track_id);
   if (chunk->track_id != pose_track_) {
     if (!planes_) return {};
     const Status status = planes_->add_chunk(*segment_, std::move(*chunk));
@@ -165,6 +161,9 @@ Status ClipReader::take(container::Record record) {
 Status ClipReader::read_until(std::uint64_t index) {
   wanted_frame_ = index;
   while (!ended_ && complete_end_ <= index) {
+    const bool enough = segment_ && index < segment_->first_frame + segment_->frame_count &&
+                        impatient_ && missing_.empty();
+    if (enough) break;
     auto record = reader_.next();
     if (record && *record) {
       RELIT_TRY(take(std::move(**record)));
@@ -217,6 +216,15 @@ Result<bool> ClipReader::jump(std::uint64_t index) {
   return true;
 }
 
+Status ClipReader::decode(std::uint64_t index) {
+  RELIT_TRY(poses_->sample(static_cast<double>(index), scratch_.pose));
+  if (!planes_) return {};
+  Status decoded = planes_->frame(index, scratch_.planes);
+  const bool early = std::exchange(impatient_, false) && missing_.empty();
+  if (!decoded && decoded.error().code == ErrorCode::kNotFound && early) return {};
+  return decoded;
+}
+
 Status ClipReader::frame(std::uint64_t index, ClipFrame& out) {
   return catch_out_of_memory("decoding a frame", [&] { return decode_frame(index, out); });
 }
@@ -238,8 +246,7 @@ Status ClipReader::decode_frame(std::uint64_t index, ClipFrame& out) {
     }
   }
   RELIT_TRY(read_until(index));
-  Status decoded = poses_->sample(static_cast<double>(index), scratch_.pose);
-  if (decoded && planes_) decoded = planes_->frame(index, scratch_.planes);
+  const Status decoded = decode(index);
   if (decoded) {
     std::swap(out, scratch_);
     shown_ = true;

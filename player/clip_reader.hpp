@@ -23,6 +23,14 @@ struct ClipOptions {
   int layers = -1;     ///< decode so many layers, from the most important on; -1: all
   int threads = 1;     ///< of each mantissa decoder
   bool planes = true;  ///< false: poses only
+  /// Not all frames will be asked for, so that of a source with byte ranges only what is needed
+  /// should be fetched. Leaving out layers means that too.
+  bool sparing = false;
+  /// The first frame need not wait for all layers: it is given as soon as the pose and the most
+  /// important layer are here, with the planes of the others empty, and the next one waits.
+  bool impatient = false;
+
+  [[nodiscard]] bool spares_bytes() const { return sparing || layers >= 0 || !planes; }
 };
 
 /// What was lost to damage so far.
@@ -45,8 +53,10 @@ struct ClipFrame {
 /// seeks; going back needs a source that can. One thread at a time.
 class ClipReader {
  public:
-  /// Reads everything static. `name` is for messages. Errors: those of the reader and the decoders;
-  /// kNotFound for a clip that is not there (names those that are), kOutOfMemory.
+  /// Reads everything static. `name` is for messages. Where options.spares_bytes(), the source is
+  /// told what will be read; one that fetches ranges should have been opened so. Errors: those of
+  /// the reader and the decoders; kNotFound for a clip that is not there (names those that are),
+  /// kOutOfMemory.
   static Result<ClipReader> open(std::unique_ptr<container::ByteSource> source,
                                  const std::string& name, const ClipOptions& options);
 
@@ -85,6 +95,8 @@ class ClipReader {
   void note_segment(const container::IndexRecord::Entry& entry);
   Result<bool> jump(std::uint64_t index);
   Status take(container::Record record);
+  void note_arrival(std::uint32_t track_id);
+  Status decode(std::uint64_t index);
   Status note_damage(const Error& error);
   void forget_before(std::uint64_t index);
   [[nodiscard]] Unexpected in_file(const Error& error) const;
@@ -107,6 +119,9 @@ class ClipReader {
   std::optional<container::SegmentRecord> segment_;  ///< whose chunks are coming in
   std::uint32_t last_chunk_ = 0;                     ///< track of the last one that is wanted
   std::uint64_t wanted_frame_ = 0;                   ///< that read_until() is on its way to
+  std::vector<std::uint32_t> first_picture_;         ///< tracks that an impatient first frame needs
+  std::vector<std::uint32_t> missing_;               ///< those of them that the segment still lacks
+  bool impatient_ = false;                           ///< until the first frame has been shown
   std::uint64_t complete_end_ = 0;                   ///< frames before this one have come
   std::uint64_t kept_begin_ = 0;                     ///< frames before this one have been forgotten
   ClipFrame scratch_;

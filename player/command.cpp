@@ -7,7 +7,6 @@
 #include <numbers>
 
 #include "decoders/sh_constants.hpp"
-#include "player/source.hpp"
 
 namespace relit::player {
 
@@ -24,9 +23,33 @@ int report(const Error& error) {
   }
 }
 
-Result<ClipReader> open_clip(const std::string& source, const ClipOptions& options) {
-  RELIT_ASSIGN(auto bytes, open_source(source));
-  return ClipReader::open(std::move(bytes), source == "-" ? "standard input" : source, options);
+int report_in(const std::string& file, const Error& error) {
+  return report({error.code, file + ": " + error.message});
+}
+
+void add_source_options(CLI::App& command, SourceArguments& arguments, const std::string& help) {
+  command.add_option("source", arguments.name, help)->required();
+  command
+      .add_option("--http-header", arguments.http_headers,
+                  "\"Name: value\", sent with every request of http(s); repeatable")
+      ->expected(1);
+}
+
+Result<std::unique_ptr<container::ByteSource>> open_source(const SourceArguments& arguments,
+                                                           bool sparing) {
+  SourceOptions options;
+  options.http_headers = arguments.http_headers;
+  options.sparing = sparing;
+  options.warn = [](const std::string& sentence) {
+    std::fprintf(stderr, "relit: warning: %s\n", sentence.c_str());
+  };
+  return open_source(arguments.name, options);
+}
+
+Result<ClipReader> open_clip(const SourceArguments& arguments, const ClipOptions& options) {
+  RELIT_ASSIGN(auto bytes, open_source(arguments, options.spares_bytes()));
+  return ClipReader::open(std::move(bytes),
+                          arguments.name == "-" ? "standard input" : arguments.name, options);
 }
 
 int report_loss(const PlaybackLoss& loss) {

@@ -12,6 +12,7 @@
 #include "player/clip_reader.hpp"
 #include "player/light.hpp"
 #include "player/scene_view.hpp"
+#include "player/source.hpp"
 
 /// What the commands of `relit` share. Messages go to standard error, data and JSON to standard
 /// output.
@@ -26,9 +27,21 @@ enum ExitStatus : int {
 
 /// Prints the error and returns the exit status it means.
 int report(const Error& error);
+/// The same, with the name of the file it is about in front.
+int report_in(const std::string& file, const Error& error);
 
-/// Opens a clip as the user named it.
-[[nodiscard]] Result<ClipReader> open_clip(const std::string& source, const ClipOptions& options);
+/// SRC and --http-header.
+struct SourceArguments {
+  std::string name;
+  std::vector<std::string> http_headers;
+};
+/// `help` describes SRC.
+void add_source_options(CLI::App& command, SourceArguments& arguments, const std::string& help);
+/// Opens SRC as the user named it; warnings go to standard error.
+[[nodiscard]] Result<std::unique_ptr<container::ByteSource>> open_source(
+    const SourceArguments& arguments, bool sparing);
+[[nodiscard]] Result<ClipReader> open_clip(const SourceArguments& arguments,
+                                           const ClipOptions& options);
 
 /// Says what was lost, if anything, and returns kSuccess or kWithLosses.
 int report_loss(const PlaybackLoss& loss);
@@ -61,5 +74,11 @@ Command add_dump(CLI::App& app);
 Command add_light(CLI::App& app);
 Command add_render(CLI::App& app);
 Command add_play(CLI::App& app);
+Command add_validate(CLI::App& app);
+Command add_recover(CLI::App& app);
+Command add_remux(CLI::App& app);
+Command add_concat(CLI::App& app);
+Command add_export(CLI::App& app);
+Command add_import(CLI::App& app);
 
 }  // namespace relit::player

@@ -9,7 +9,8 @@ namespace {
 using decoders::NpyWriter;
 
 struct Arguments {
-  std::string source, output, mask, clip, frame, frames;
+  SourceArguments source;
+  std::string output, mask, clip, frame, frames;
   int layers = -1;
   int threads = 1;
 };
@@ -58,7 +59,7 @@ int run(const Arguments& arguments) {
   }
   ClipOptions options;
   options.clip = arguments.clip, options.layers = arguments.layers,
-  options.threads = arguments.threads;
+  options.threads = arguments.threads, options.sparing = arguments.frames.empty();
   auto clip = open_clip(arguments.source, options);
   if (!clip) return report(clip.error());
   if (!arguments.mask.empty()) {
@@ -78,7 +79,7 @@ Command add_dump(CLI::App& app) {
   CLI::App* command =
       app.add_subcommand("dump", "write decoded transfer coefficients as NumPy arrays");
   const auto arguments = std::make_shared<Arguments>();
-  command->add_option("source", arguments->source, "path, - or http(s)://")->required();
+  add_source_options(*command, arguments->source, "path, - or http(s)://");
   auto* frame = command->add_option("--frame", arguments->frame,
                                     "one frame: float32 [coefficients][3][H][W]");
   command->add_option("--frames", arguments->frames, "A-B: float32 [frames][coefficients][3][H][W]")

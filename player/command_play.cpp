@@ -2,13 +2,15 @@
 #include <filesystem>
 
 #include "player/command.hpp"
+#include "player/http_source.hpp"
 #include "player/window.hpp"
 
 namespace relit::player {
 namespace {
 
 struct Arguments {
-  std::string source, clip, camera;
+  SourceArguments source;
+  std::string clip, camera;
   std::vector<std::string> lights;
   LightArguments light;
   WindowOptions window;
@@ -20,7 +22,7 @@ Status play(const Arguments& arguments, ClipReader& clip) {
   if (!arguments.camera.empty()) {
     RELIT_ASSIGN(window.view.camera, parse_camera(arguments.camera));
   }
-  window.title = std::filesystem::path(arguments.source).filename().string();
+  window.title = std::filesystem::path(arguments.source.name).filename().string();
   std::vector<LoadedLight> lights;
   for (const std::string& path : arguments.lights) {
     LightArguments one = arguments.light;
@@ -35,6 +37,8 @@ int run(const Arguments& arguments) {
   ClipOptions options;
   options.clip = arguments.clip, options.layers = arguments.window.view.layers,
   options.threads = arguments.threads;
+  // What comes over a network is shown as soon as it can be, a disk is waited for.
+  options.impatient = is_http_address(arguments.source.name);
   auto clip = open_clip(arguments.source, options);
   if (!clip) return report(clip.error());
   if (const Status status = play(arguments, *clip); !status) return report(status.error());
@@ -46,7 +50,7 @@ int run(const Arguments& arguments) {
 Command add_play(CLI::App& app) {
   CLI::App* command = app.add_subcommand("play", "play a clip in a window");
   const auto a = std::make_shared<Arguments>();
-  command->add_option("source", a->source, "path, - or http(s)://; a pipe cannot loop")->required();
+  add_source_options(*command, a->source, "path, - or http(s)://; a pipe cannot loop");
   command
       ->add_option("--light", a->lights,
                    ".hdr, .exr (equirectangular) or .json; several are taken in turn")

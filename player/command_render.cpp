@@ -12,7 +12,8 @@ namespace relit::player {
 namespace {
 
 struct Arguments {
-  std::string source, output, clip, frame, frames, camera, sheet, backend = "egl", size = "512x512";
+  SourceArguments source;
+  std::string output, clip, frame, frames, camera, sheet, backend = "egl", size = "512x512";
   LightArguments light;
   ViewOptions view;
   double time_s = -1;
@@ -203,6 +204,8 @@ int run(const Arguments& arguments) {
   ClipOptions options;
   options.clip = arguments.clip, options.layers = arguments.layers,
   options.threads = arguments.threads;
+  options.sparing = !arguments.frame.empty() || arguments.time_s >= 0 || arguments.lightmap ||
+                    !arguments.sheet.empty();
   auto clip = open_clip(arguments.source, options);
   if (!clip) return report(clip.error());
   if (const Status status = render(arguments, *clip); !status) return report(status.error());
@@ -221,7 +224,7 @@ Command add_render(CLI::App& app) {
   CLI::App* command = app.add_subcommand(
       "render", "relight a clip: pictures, films, contact sheets or the light map itself");
   const auto a = std::make_shared<Arguments>();
-  command->add_option("source", a->source, "path, - or http(s)://")->required();
+  add_source_options(*command, a->source, "path, - or http(s)://");
   command->add_option("--light", a->light.path, ".hdr, .exr (equirectangular) or .json")
       ->required();
   add_light_options(*command, a->light);

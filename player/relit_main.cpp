@@ -21,11 +21,17 @@ int main(int argc, char** argv) {
     const char* name;
     Command run;
   };
-  const std::array<Entry, 5> commands{{{"info", add_info(app)},
-                                       {"dump", add_dump(app)},
-                                       {"light", add_light(app)},
-                                       {"render", add_render(app)},
-                                       {"play", add_play(app)}}};
+  const std::array<Entry, 11> commands{{{"info", add_info(app)},
+                                        {"dump", add_dump(app)},
+                                        {"light", add_light(app)},
+                                        {"render", add_render(app)},
+                                        {"play", add_play(app)},
+                                        {"validate", add_validate(app)},
+                                        {"recover", add_recover(app)},
+                                        {"remux", add_remux(app)},
+                                        {"concat", add_concat(app)},
+                                        {"export", add_export(app)},
+                                        {"import", add_import(app)}}};
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

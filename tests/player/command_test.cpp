@@ -147,6 +147,7 @@ TEST_CASE("info says the same to people and to programs") {
   CHECK(json.at("complete") == true);
   CHECK(json.at("models").at(0).at("order") == 2);
   CHECK(json.at("models").at(0).at("layers").size() == 3);
+  CHECK(json.at("segments").at(0).at("chunks").at(0).at("packets").size() == 1);
   REQUIRE(run_relit("info " + shipped_clip().string(), &says) == 0);
   CHECK(says.find("order 2 (9 coefficients)") != std::string::npos);
 }
