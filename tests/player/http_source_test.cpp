@@ -186,7 +186,8 @@ TEST_CASE("http: layers that are left out are not fetched") {
                 static_cast<unsigned long long>(needed), static_cast<unsigned long long>(sent),
                 static_cast<double>(sent) / static_cast<double>(needed),
                 static_cast<unsigned long long>(traffic.requests));
-    CHECK(sent == traffic.bytes);
+    // The end of a range whose length was guessed too long may be under way when it is closed.
+    CHECK(sent >= traffic.bytes);
     CHECK(sent <= needed + needed / 20);
     for (const auto& request : requests) CHECK(request.range.back() != '-');
   }
