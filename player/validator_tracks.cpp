@@ -163,9 +163,11 @@ void TrackChecker::check_order(const FindingPlace& place, const ChunkRecord& chu
   const auto pictures =
       video.exponents ? video.layer->exponent_pictures : video.layer->mantissa_pictures;
   if (pictures != 1) return;
+  // FFV1 refers to no picture: what its packets hand on is the state of the entropy coder.
+  const bool intra = (video.exponents ? video.layer->exponent_codec : video.layer->codec) == "ffv1";
   std::int64_t previous = -1;
   for (const Packet& packet : chunk.packets) {
-    if (packet.key && packet.pts > previous) {
+    if ((packet.key || intra) && packet.pts > previous) {
       previous = packet.pts;
       continue;
     }

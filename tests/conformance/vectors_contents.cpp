@@ -148,8 +148,10 @@ void add_video(Vectors& vectors) {
   h264.frames = 12;
   h264.coding.segment_frames = 8;
   from_draft(vectors, "codec-unknown", "a codec that no decoder knows",
-             {Outcome::kWhole, {"VIDEO_CODEC"}, true, false},
-             [](Draft& d) { d.layers[0].codec = "relit-test"; });
+             {Outcome::kWhole, {"VIDEO_CODEC"}, true, false}, [](Draft& d) {
+               d.layers[0].codec = "relit-test";
+               d.layers[0].mantissa_pictures = 2;
+             });
   from_draft(vectors, "codec-private", "a codec_private that the decoder refuses",
              undecodable({"VIDEO_OPEN"}), [](Draft& d) {
                d.layers[0].codec_private = {9, 9, 9};

@@ -158,6 +158,8 @@ void add_values(Vectors& vectors) {
   });
   good(vectors, "tick-rate-largest", "2^31 - 1 ticks a second", [](Draft& d) {
     d.clips[0].tick_rate = {limits::kRational, 1};
+    d.models.clear(), d.layers.clear();
+    for (DraftSegment& segment : d.segments) segment.chunks.resize(1);
   });
   good(vectors, "tick-rate-smallest", "a tick of 2^31 - 1 seconds", [](Draft& d) {
     d.clips[0].tick_rate = {1, limits::kRational};

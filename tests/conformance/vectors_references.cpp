@@ -101,7 +101,8 @@ void add_order(Vectors& vectors) {
   from_pieces(vectors, "order-head-second", "CLIP before HEAD",
               refused({"ORDER_HEAD", "ORDER_RECORD", "COPY_ORDER"}),
               swapped(types::kHeader, types::kClip));
-  from_pieces(vectors, "order-mesh-before-material", "MESH before MATL", refused({"ORDER_RECORD"}),
+  from_pieces(vectors, "order-mesh-before-material", "MESH before MATL",
+              refused({"ORDER_RECORD", "REF_INVALID", "COPY_ORDER"}),
               swapped(types::kMaterial, types::kMesh));
   from_pieces(vectors, "order-two-skeletons", "SKEL twice", faulty({"ORDER_RECORD", "COPY_ORDER"}),
               [](std::vector<Piece>& p) {

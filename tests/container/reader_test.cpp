@@ -485,3 +485,15 @@ TEST_CASE("a header that promises a gigabyte costs no more than what comes") {
   CHECK(all.error().code == ErrorCode::kTruncated);
   CHECK(all.error().message.find("'IMAG' at byte " + std::to_string(at)) != std::string::npos);
 }
+
+TEST_CASE("a file without segments has its copies behind the static part") {
+  MemorySink sink;
+  auto writer = Writer::create(sink, "sample 1");
+  REQUIRE(writer);
+  REQUIRE(writer->add(sample::clip()));
+  REQUIRE(writer->finish());
+  const auto all = sample::read_everything(sample::memory(sink.take()));
+  REQUIRE(all);
+  CHECK(all->errors.empty());
+  CHECK(all->finished);
+}
