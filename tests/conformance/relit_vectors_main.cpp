@@ -91,7 +91,8 @@ ordered_json expectations(const Vector& vector, const Bytes& bytes) {
   expect(seen == vector.outcome, std::string("it is ") + outcome_name(seen) + ", not " +
                                      outcome_name(vector.outcome) + ": " +
                                      (survey ? survey->damage : survey.error().message));
-  json["info"] = seen == Outcome::kWhole ? player::survey_json(*survey) : ordered_json(nullptr);
+  json["info"] = nullptr;
+  if (vector.valid && seen == Outcome::kWhole) json["info"] = player::survey_json(*survey);
   json["frames"] = nullptr;
   if (seen == Outcome::kRefused) return json;
   auto frames = decode_frames(memory(bytes));
