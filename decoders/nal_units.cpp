@@ -213,8 +213,9 @@ Result<std::vector<std::uint8_t>> make_hvcc(std::span<const Unit> units) {
   record.push_back(static_cast<std::uint8_t>(0xf8 | (header.luma_bits - 8)));
   record.push_back(static_cast<std::uint8_t>(0xf8 | (header.chroma_bits - 8)));
   record.insert(record.end(), {0, 0});
-  record.push_back(static_cast<std::uint8_t>(
-      (header.temporal_layers << 3) | (header.temporal_nesting ? 4 : 0) | (kLengthBytes - 1)));
+  record.push_back(static_cast<std::uint8_t>((header.temporal_layers << 3) |
+                                             (header.temporal_nesting ? 4 : 0) |
+                                             static_cast<int>(kLengthBytes - 1)));
   record.push_back(static_cast<std::uint8_t>(kHevcLists.size()));
   record.insert(record.end(), lists.begin(), lists.end());
   return record;
