@@ -15,11 +15,12 @@ namespace {
 using Matrix = Eigen::SparseMatrix<double>;
 
 constexpr float kSmoothCosine = 0.99f;
-// Weights of the two terms. Seams count as much as a few texels: enough to close them to a
-// hundredth of what they were, and yet a traced texel gives way only where it lies on one.
-constexpr double kSeamWeight = 4.0;
+// Weights of the two terms. On CesiumMan at 128x128 they bring the mismatch down to a sixth. Much
+// looser filled texels would close seams further, but swing far beyond the values around them where
+// a lookup gives them little weight, and the quantiser's range with them.
+constexpr double kSeamWeight = 2.0;
 constexpr double kTracedWeight = 1.0;
-constexpr double kFilledWeight = 0.02;
+constexpr double kFilledWeight = 0.5;
 
 using Key = std::array<float, 3>;
 Key key_of(const glm::vec3& p) { return {p.x, p.y, p.z}; }
@@ -192,8 +193,12 @@ void SeamStitcher::stitch(std::span<float> plane) const {
     for (std::size_t k = 0; k < 8; ++k) right[d.slot[k]] -= d.weight[k] * difference;
   }
   const Eigen::VectorXd change = impl_->solver.solve(right);
-  for (std::size_t i = 0; i < impl_->texels.size(); ++i)
-    plane[impl_->texels[i]] += static_cast<float>(change[static_cast<Eigen::Index>(i)]);
+  const auto [least, most] = std::ranges::minmax(plane);
+  for (std::size_t i = 0; i < impl_->texels.size(); ++i) {
+    float& value = plane[impl_->texels[i]];
+    value =
+        std::clamp(value + static_cast<float>(change[static_cast<Eigen::Index>(i)]), least, most);
+  }
 }
 
 double SeamStitcher::mismatch(std::span<const float> plane) const {

@@ -36,9 +36,10 @@ struct SeamGeometry {
 ///     Σ_seam samples (bilinear(x, uv on one side) − bilinear(x, uv on the other))² · w
 ///     + Σ_texels c · (x − given)²
 ///
-/// over the texels that bilinear lookups on seams touch, c being small where a texel was only
-/// filled. The matrix depends on the layout alone: it is factored once (sparse Cholesky) and solved
-/// for each plane. Linear; a constant stays that constant.
+/// over the texels that bilinear lookups on seams touch, c being smaller where a texel was only
+/// filled, and keeps them within the range that the plane had. The matrix depends on the layout
+/// alone: it is factored once (sparse Cholesky) and solved for each plane. A constant stays that
+/// constant.
 class SeamStitcher {
  public:
   /// `samples` tell which texels were traced.
