@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "container/base/out_of_memory.hpp"
-
 #include "player/video_tracks.hpp"
 
 namespace relit::player {
