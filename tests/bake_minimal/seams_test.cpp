@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "bake_minimal/seams.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -96,7 +97,7 @@ TEST_CASE("stitching closes seams and leaves the rest alone") {
   stitcher.stitch(after);
   CHECK(stitcher.mismatch(before) > 0.3);
   // Even noise, which no light map resembles, loses most of its mismatch.
-  CHECK(stitcher.mismatch(after) < 0.25 * stitcher.mismatch(before));
+  CHECK(stitcher.mismatch(after) < 0.3 * stitcher.mismatch(before));
   int changed = 0;
   for (std::size_t i = 0; i < after.size(); ++i) {
     changed += after[i] != before[i] ? 1 : 0;
@@ -106,10 +107,13 @@ TEST_CASE("stitching closes seams and leaves the rest alone") {
     if (!near) CHECK(after[i] == before[i]);
   }
   CHECK(changed > 40);
+  // Never beyond what the plane held: the quantiser's range is not to grow.
+  CHECK(std::ranges::max(after) <= std::ranges::max(before));
+  CHECK(std::ranges::min(after) >= std::ranges::min(before));
   CHECK(static_cast<std::size_t>(changed) <= stitcher.texel_count());
 }
 
-TEST_CASE("a light map without mismatch stays as it is, and stitching is linear") {
+TEST_CASE("a light map without mismatch stays as it is, and stitching knows no scale") {
   const Strip flat(0);
   const SeamStitcher stitcher(kSize, kSize, find_seams(flat.geometry(), flat.geometry()), traced());
   std::vector<float> constant(kSize * kSize, 0.75f);
@@ -131,7 +135,7 @@ TEST_CASE("filled texels give way before traced ones") {
   std::vector<float> a = noise(), b = a;
   all_traced.stitch(a);
   none_traced.stitch(b);
-  CHECK(none_traced.mismatch(b) < 0.2 * all_traced.mismatch(a));
+  CHECK(none_traced.mismatch(b) < 0.75 * all_traced.mismatch(a));
 }
 
 TEST_CASE("a light map without seams, of one texel, or on the border is no trouble") {
