@@ -106,7 +106,8 @@ void take_chunk(Decoding& d, const SegmentRecord& segment, const ChunkRecord& ch
     if (m.model.clip_id == segment.clip_id) (void)m.decoder.add_chunk(segment, chunk);
   }
   for (ClipPoses& p : d.poses) {
-    if (p.record.track_id == chunk.track_id) take_pose(p, segment, chunk);
+    if (p.record.clip_id == segment.clip_id && p.record.track_id == chunk.track_id)
+      take_pose(p, segment, chunk);
   }
 }
 
