@@ -74,7 +74,7 @@ TEST_CASE("a damaged static record is taken from its copy") {
   const auto offsets = statics(file, false);
   for (std::size_t i = 1; i < offsets.size(); ++i) {
     CAPTURE(i);
-    for (const std::uint64_t place : {24, 20, 9}) {  // payload, header checksum, length
+    for (const std::uint64_t place : {24u, 20u, 9u}) {  // payload, header checksum, length
       CAPTURE(place);
       const auto repaired = read_everything(sample::memory(damaged(file, offsets[i] + place)));
       REQUIRE(repaired);
