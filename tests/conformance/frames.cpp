@@ -160,7 +160,10 @@ ordered_json frame_json(ModelTracks& m, std::uint64_t frame, std::vector<float>&
 ordered_json model_json(ModelTracks& m, std::uint64_t frame_count) {
   std::vector<float> transfer(m.model.mean.size() * 3 * m.model.width * m.model.height);
   ordered_json frames = ordered_json::array();
-  for (std::uint64_t f = 0; f < frame_count; ++f) frames.push_back(frame_json(m, f, transfer));
+  // Without the posed normals at its texels a model that predicts has to be refused.
+  const bool refused = m.model.prediction_plane >= 0;
+  for (std::uint64_t f = 0; f < frame_count; ++f)
+    frames.push_back(refused ? ordered_json() : frame_json(m, f, transfer));
   return {{"model", m.model.id},
           {"clip", m.model.clip_id},
           {"probe_texels", probe_texels(m.model)},
