@@ -69,6 +69,19 @@ Status check_plane(const ModelRecord& model, const LayerRecord& layer, const Pla
   return {};
 }
 
+}  // namespace
+
+VideoFormat mantissa_format(const LayerRecord& layer) {
+  return {layer.codec,  layer.codec_private, layer.coded_width,   layer.coded_height,
+          layer.chroma, layer.bit_depth,     layer.mantissa_track};
+}
+
+VideoFormat exponent_format(const LayerRecord& layer) {
+  return {layer.exponent_codec,  layer.exponent_private, layer.exponent_width,
+          layer.exponent_height, Chroma::kLuma,          8,
+          layer.exponent_track};
+}
+
 SampleView crop(const VideoFrame& picture, int component, const Rect& rect, int shift) {
   SampleView view = picture.component(component);
   view.data += (rect.y >> shift) * view.stride_bytes +
@@ -78,7 +91,6 @@ SampleView crop(const VideoFrame& picture, int component, const Rect& rect, int 
   return view;
 }
 
-/// The samples of GBR pictures' planes follow the bitstream's order, so no component is permuted.
 PlaneView view_plane(const LayerRecord& layer, const PlaneRecord& plane,
                      const VideoFrame& mantissas, const VideoFrame* exponents) {
   PlaneView view;
@@ -93,8 +105,6 @@ PlaneView view_plane(const LayerRecord& layer, const PlaneRecord& plane,
   }
   return view;
 }
-
-}  // namespace
 
 Status check_layer(const ModelRecord& model, const LayerRecord& layer) {
   const std::string where = "layer " + std::to_string(layer.id);
@@ -135,24 +145,10 @@ void FrameView::clear() {
 Result<LayerDecoder> LayerDecoder::open(const ModelRecord& model, const LayerRecord& layer,
                                         int threads) {
   RELIT_TRY(check_layer(model, layer));
-  VideoFormat format;
-  format.codec = layer.codec;
-  format.codec_private = layer.codec_private;
-  format.width = layer.coded_width;
-  format.height = layer.coded_height;
-  format.chroma = layer.chroma;
-  format.bit_depth = layer.bit_depth;
-  format.track_id = layer.mantissa_track;
-  RELIT_ASSIGN(TrackDecoder mantissas, TrackDecoder::open(format, threads));
+  RELIT_ASSIGN(TrackDecoder mantissas, TrackDecoder::open(mantissa_format(layer), threads));
   LayerDecoder decoder(layer, std::move(mantissas));
   if (layer.has_exponents) {
-    VideoFormat exponent_format;
-    exponent_format.codec = layer.exponent_codec;
-    exponent_format.codec_private = layer.exponent_private;
-    exponent_format.width = layer.exponent_width;
-    exponent_format.height = layer.exponent_height;
-    exponent_format.track_id = layer.exponent_track;
-    RELIT_ASSIGN(TrackDecoder exponents, TrackDecoder::open(exponent_format, 1));
+    RELIT_ASSIGN(TrackDecoder exponents, TrackDecoder::open(exponent_format(layer), 1));
     decoder.exponents_.emplace(std::move(exponents));
   }
   return decoder;

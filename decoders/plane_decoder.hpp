@@ -35,6 +35,22 @@ class FrameView {
   std::vector<VideoFrame> pictures_;  ///< two for each layer: mantissas, exponents
 };
 
+/// What the streams of a layer claim to be. exponent_format() is for layers that have exponents.
+[[nodiscard]] VideoFormat mantissa_format(const container::LayerRecord& layer);
+[[nodiscard]] VideoFormat exponent_format(const container::LayerRecord& layer);
+
+/// The part of a component that a rectangle, in samples of component 0, covers; `shift` is 1 where
+/// the component has half the width and height, else 0. Borrows the picture.
+[[nodiscard]] SampleView crop(const VideoFrame& picture, int component, const container::Rect& rect,
+                              int shift);
+
+/// A plane of a layer in its decoded pictures, which the view borrows; `exponents` is null where
+/// the layer has none. The samples of GBR pictures' planes follow the bitstream's order, so no
+/// component is permuted. The layer must have passed check_layer().
+[[nodiscard]] PlaneView view_plane(const container::LayerRecord& layer,
+                                   const container::PlaneRecord& plane, const VideoFrame& mantissas,
+                                   const VideoFrame* exponents);
+
 /// Checks a layer against its model: sizes, rectangles inside their pictures and, with 4:2:0, on
 /// even places, components that the chroma format has, finite positive scales, matrix entries in
 /// range. Errors: kCorrupt, kLimit, kUnsupported, each naming layer and plane.

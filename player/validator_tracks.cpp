@@ -2,12 +2,12 @@
 #include "player/validator_tracks.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <limits>
 #include <string>
 #include <utility>
 
 #include "decoders/coverage.hpp"
+#include "decoders/sh_constants.hpp"
 
 namespace relit::player {
 
@@ -18,43 +18,10 @@ using decoders::VideoFrame;
 namespace {
 
 /// T_0 of a point that sees nothing but a uniform light: 1/√(4π).
-constexpr double kUnoccluded = 0.28209479177387814;
+constexpr double kUnoccluded = decoders::kBand0;
 /// Lossy coding overshoots, and light between surfaces of unit albedo adds up; a mistake in a scale
 /// or a matrix goes further.
 constexpr double kTransferTolerance = 0.5 * kUnoccluded;
-
-decoders::VideoFormat format_of(const LayerRecord& layer, bool exponents) {
-  if (exponents)
-    return {layer.exponent_codec,  layer.exponent_private, layer.exponent_width,
-            layer.exponent_height, Chroma::kLuma,          8,
-            layer.exponent_track};
-  return {layer.codec,  layer.codec_private, layer.coded_width,   layer.coded_height,
-          layer.chroma, layer.bit_depth,     layer.mantissa_track};
-}
-
-SampleView crop(const VideoFrame& picture, int component, const Rect& rect, int shift) {
-  SampleView view = picture.component(component);
-  view.data += (rect.y >> shift) * view.stride_bytes +
-               std::ptrdiff_t{rect.x >> shift} * view.bytes_per_sample;
-  view.width = (rect.width + (1 << shift) - 1) >> shift;
-  view.height = (rect.height + (1 << shift) - 1) >> shift;
-  return view;
-}
-
-PlaneView view_of(const LayerRecord& layer, const PlaneRecord& plane, const VideoFrame& mantissas,
-                  const VideoFrame* exponents) {
-  PlaneView view;
-  view.mantissa_shift = layer.chroma == Chroma::k420 && plane.component > 0 ? 1 : 0;
-  view.mantissa = crop(mantissas, plane.component, plane.mantissa_rect, view.mantissa_shift);
-  view.mantissa_zero = layer.bit_depth == 8 ? 128 : 512;
-  view.exponent_zero = layer.bit_depth == 8 ? 135 : 137;
-  view.scale = plane.scale;
-  if (exponents != nullptr) {
-    view.exponent = crop(*exponents, 0, plane.exponent_rect, 0);
-    view.exponent_shift = std::countr_zero(unsigned{layer.exponent_block});
-  }
-  return view;
-}
 
 std::string track_name(std::uint32_t track) { return "track " + std::to_string(track); }
 
@@ -93,7 +60,8 @@ void TrackChecker::open(const StaticChecker& statics) {
 }
 
 void TrackChecker::open_video(const FindingPlace& place, const LayerRecord& layer, bool exponents) {
-  const auto format = format_of(layer, exponents);
+  const auto format =
+      exponents ? decoders::exponent_format(layer) : decoders::mantissa_format(layer);
   const auto [at, fresh] = videos_.try_emplace(format.track_id);
   if (!fresh) return;
   at->second.layer = &layer;
@@ -217,7 +185,7 @@ void TrackChecker::check_exponents(const FindingPlace& place, std::int64_t frame
     const Rect& rect = plane.exponent_rect;
     if (previous != nullptr && *previous == rect) continue;
     previous = &rect;
-    const SampleView view = crop(picture, 0, rect, 0);
+    const SampleView view = decoders::crop(picture, 0, rect, 0);
     for (int y = 0; y < view.height; ++y) {
       for (int x = 0; x < view.width; ++x) {
         const int value = view.at(x, y);
@@ -246,7 +214,7 @@ std::optional<TrackChecker::Range> TrackChecker::mean_transfer(const Coverage& c
         record.has_exponents ? &videos_.at(record.exponent_track).first : nullptr;
     if (mantissas.empty() || (exponents != nullptr && exponents->empty())) return std::nullopt;
     for (const PlaneRecord& plane : record.planes)
-      add_mean(plane, view_of(record, plane, mantissas, exponents), model, sums);
+      add_mean(plane, decoders::view_plane(record, plane, mantissas, exponents), model, sums);
   }
   std::optional<Range> range;
   for (std::size_t i = 0; i < sums.size(); ++i) {
