@@ -60,6 +60,7 @@ Result<BackgroundRenderer> BackgroundRenderer::create(const Device& device) {
   BackgroundRenderer renderer;
   renderer.device_ = &device;
   renderer.half_float_ = device.caps().half_float_texture && device.caps().half_float_linear;
+  StateGuard guard(device);
   const std::string_view vertex[] = {shaders::present_vert};
   const std::string_view fragment[] = {shaders::dither, shaders::gradient_frag};
   RELIT_ASSIGN(renderer.gradient_, build_program(device.gl(), device.profile(),

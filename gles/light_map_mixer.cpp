@@ -76,6 +76,10 @@ Result<LightMap> LightMapMixer::mix(const LightMap& a, const LightMap& b, float 
   RELIT_TRY(device_->ready("mixing light maps"));
   if (a.texture == 0 || b.texture == 0 || !(weight >= 0) || weight > 1)
     return fail(ErrorCode::kInvalid, "mixing needs two light maps and a weight from 0 to 1");
+  const bool roots = storage_.format == LightMapFormat::kSquareRoot8;
+  if (roots && !(a.square_root && b.square_root))
+    return fail(ErrorCode::kUnsupported,
+                "light maps of floats do not mix into square roots, whose peak must be known");
   const double share_a = (1 - static_cast<double>(weight)) * static_cast<double>(a.scale);
   const double share_b = static_cast<double>(weight) * static_cast<double>(b.scale) *
                          static_cast<double>(b.magnitude) / static_cast<double>(a.magnitude);
@@ -110,7 +114,7 @@ Result<LightMap> LightMapMixer::mix(const LightMap& a, const LightMap& b, float 
   result_.texture = target_.name();
   result_.width = width_;
   result_.height = height_;
-  result_.square_root = storage_.format == LightMapFormat::kSquareRoot8;
+  result_.square_root = roots;
   result_.linear_filter = storage_.linear_filter;
   result_.scale = static_cast<float>(scale);
   result_.magnitude = a.magnitude;

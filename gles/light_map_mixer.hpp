@@ -20,7 +20,8 @@ class LightMapMixer {
   static Result<LightMapMixer> create(const Device& device, int width, int height,
                                       LightMapFormat format = LightMapFormat::kAuto);
 
-  /// Errors: kInvalid for a weight outside 0..1 or a map without a texture, kEnvironment.
+  /// Errors: kInvalid for a weight outside 0..1 or a map without a texture, kUnsupported for floats
+  /// into square roots, kEnvironment.
   Result<LightMap> mix(const LightMap& a, const LightMap& b, float weight);
 
   /// Reads the last mix as Compositor::read_back() does.

@@ -155,6 +155,7 @@ class Relighter {
   Status composite_on_gpu(const FrameMix& mix);
   Result<int> upload(const decoders::FrameView& frame, int other_slot);
   [[nodiscard]] int slot_of(const decoders::FrameView& frame) const;
+  Result<gles::LightMap> upload_map(std::span<const float> values);
   Status fade_on_cpu(Relighter& to, float weight);
   Result<double> time_path(CompositePath path, const FrameMix& mix,
                            gles::CharacterRenderer& renderer, const gles::View& view);

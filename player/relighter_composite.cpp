@@ -130,12 +130,18 @@ Status Relighter::composite_on_cpu(const FrameMix& mix) {
   RELIT_TRY(job.validate());
   job.run();
   if (options_.device == nullptr) return {};
+  RELIT_ASSIGN(map_, upload_map(composite_));
+  return {};
+}
+
+Result<gles::LightMap> Relighter::upload_map(std::span<const float> values) {
   const std::size_t half = half_size_ ? 1 : 0;
   RELIT_TRY(prepare_uploader(half));
-  RELIT_ASSIGN(gles::LightMap map, uploaders_[half]->upload(job.out, light_.magnitude));
+  const auto size = static_cast<std::size_t>(width()) * static_cast<std::size_t>(height());
+  RELIT_ASSIGN(gles::LightMap map,
+               uploaders_[half]->upload(values.first(3 * size), light_.magnitude));
   if (half_size_) map.place = gles::half_place(model_->width, model_->height);
-  map_ = map;
-  return {};
+  return map;
 }
 
 int Relighter::slot_of(const decoders::FrameView& frame) const {
@@ -202,10 +208,10 @@ Status Relighter::read(std::span<float> out) {
     return fail(ErrorCode::kInvalid,
                 "a light map is read after a composite, into " + std::to_string(size) + " floats");
   }
-  if (faded_) {
-    RELIT_TRY(mixer_->read_back(out));
-  } else if (has_faded_) {
+  if (has_faded_) {
     std::copy_n(faded_on_cpu_.begin(), size, out.begin());
+  } else if (faded_) {
+    RELIT_TRY(mixer_->read_back(out));
   } else if (path_ == CompositePath::kCpu) {
     std::copy_n(composite_.begin(), size, out.begin());
   } else {
@@ -227,7 +233,13 @@ Status Relighter::fade(Relighter& to, float weight) {
     return fail(ErrorCode::kInvalid, "a fade needs both light maps composited");
   }
   if (weight == 0) return {};
-  if (options_.device == nullptr) return fade_on_cpu(to, weight);
+  if (path_ == CompositePath::kCpu && to.path_ == CompositePath::kCpu) {
+    RELIT_TRY(fade_on_cpu(to, weight));
+    has_faded_ = true;
+    if (options_.device == nullptr) return {};
+    RELIT_ASSIGN(faded_, upload_map(faded_on_cpu_));
+    return {};
+  }
   RELIT_ASSIGN(const gles::LightMap mine, texture());
   RELIT_ASSIGN(const gles::LightMap other, to.texture());
   if (!mixer_ || mixer_->width() != width() || mixer_->height() != height()) {
@@ -281,7 +293,6 @@ Status Relighter::fade_on_cpu(Relighter& to, float weight) {
       }
     }
   }
-  has_faded_ = true;
   return {};
 }
 
