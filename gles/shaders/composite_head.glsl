@@ -1,6 +1,7 @@
 // light map = constant + sum over k of w[k] * mantissa_k(p) * 2^(E_k(p) - E_ref). Mantissas are normalised to
 // [-1, 1) and the rest of each plane's factor is in its weight. The bias goes before the weight:
 // taken out of the sum it would cost half floats most of their bits.
+
 // The bytes of a 16-bit sample in memory order are red and green (ES 3), luminance and alpha (ES 2).
 #ifdef RELIT_ES3
 #define SECOND g
@@ -15,7 +16,8 @@
 #define HIGH_BYTE SECOND
 #endif
 
-// Without exponents in full precision it may be, though: raw samples then, the bias in u_constant.
+// In full precision and without exponents the bias may be taken out: samples are raw then, and it is in
+// u_constant.
 #ifdef RELIT_MEDIUMP
 // x/255 comes back from the sampler rounded to 11 bits; the integer it stands for is exact.
 float byte(float x) { return floor(x * 255.0 + 0.5); }
