@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "container/base/kept.hpp"
 #include "container/base/result.hpp"
 #include "container/byte_source.hpp"
 #include "container/reader.hpp"
@@ -72,7 +73,7 @@ class ClipDemuxer {
   enum class Event {
     kSegment,  ///< segment() is another one, or none that concerns this clip
     kChunk,    ///< `chunk` belongs to segment()
-    kDamage,   ///< something was lost; loss() tells
+    kNothing,  ///< nothing of this clip, or something was lost: loss() tells
     kEnd,      ///< no segments follow
   };
   /// Reads one record. Segments that end at or before frame `target` are passed over as a whole.
@@ -83,6 +84,9 @@ class ClipDemuxer {
   void recycle(container::ChunkRecord&& chunk);
 
   /// The one whose chunks are coming; null between segments.
+  /// Storage of chunks that were given back.
+  [[nodiscard]] std::size_t spare_bytes() const { return reader_.spare_bytes(); }
+
   [[nodiscard]] const container::SegmentRecord* segment() const {
     return segment_ ? &*segment_ : nullptr;
   }
@@ -98,6 +102,15 @@ class ClipDemuxer {
   Result<bool> jump_to_tick(std::uint64_t tick);
   /// Passes over the rest of the current segment's chunks.
   void skip_segment();
+
+  /// Errors: kNotFound, saying when the clip ended, for a tick beyond it.
+  [[nodiscard]] Status check_tick(std::uint64_t tick) const;
+  /// The error of a tick whose segment is not to be found.
+  [[nodiscard]] Unexpected missing_tick(std::uint64_t tick) const;
+  /// Errors: kNotFound, saying how many frames there are, for one beyond the clip.
+  [[nodiscard]] Status check_frame(std::uint64_t frame) const;
+  /// The error of a frame behind what a source that cannot go back has read.
+  [[nodiscard]] Unexpected gone_by(std::uint64_t frame) const;
 
   /// What is known of the frames' times so far.
   [[nodiscard]] const container::Timeline& timeline() const { return timeline_; }
@@ -123,6 +136,7 @@ class ClipDemuxer {
   Event take(container::Record record, std::uint64_t target, container::ChunkRecord& chunk);
   Event take_segment(container::SegmentRecord segment, std::uint64_t offset_bytes,
                      std::uint64_t target);
+  void find_last_chunk();
   Result<Event> pass_damage(const Error& error);
 
   container::Reader reader_;
@@ -138,8 +152,8 @@ class ClipDemuxer {
   std::map<std::uint64_t, container::IndexRecord::Entry> segments_;  ///< known ones, by first frame
   std::map<std::uint64_t, std::uint64_t> first_frames_;              ///< of the same, by first tick
   bool index_loaded_ = false;
-  std::optional<container::SegmentRecord> segment_;  ///< whose chunks are coming in
-  std::uint32_t last_chunk_ = 0;                     ///< track of the last one that is wanted
+  Kept<container::SegmentRecord> segment_;   ///< whose chunks are coming in
+  std::optional<std::uint32_t> last_chunk_;  ///< track of its last one that is wanted
   std::uint64_t complete_end_ = 0;
   bool ended_ = false;
   std::string first_loss_;

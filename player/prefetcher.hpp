@@ -41,8 +41,8 @@ struct PrefetchOptions {
 struct PrefetchStats {
   struct Track {
     std::uint32_t track_id = 0;
-    int layer = -1;          ///< number of the layer; -1: the poses
-    bool exponents = false;  ///< of that layer, else its mantissas
+    int layer = -1;           ///< number of the layer; -1: the poses
+    bool exponents = false;   ///< of that layer, else its mantissas
     std::uint64_t bytes = 0;  ///< of chunks that came
   };
   std::vector<Track> tracks;
@@ -131,8 +131,9 @@ class Prefetcher {
   [[nodiscard]] PrefetchStats stats() const;
   [[nodiscard]] PlaybackLoss loss() const;
 
+  struct State;  ///< the implementation's
+
  private:
-  struct State;
   explicit Prefetcher(std::unique_ptr<State> state);
   std::unique_ptr<State> state_;
 };
