@@ -154,8 +154,8 @@ void State::restart(std::uint64_t index, std::optional<std::uint64_t> tick) {
 /// Whether going on comes to this frame soon.
 bool State::is_near(std::uint64_t index) const {
   if (demux_epoch != epoch) return false;
-  if (!next_index || index < *next_index || demux_lap != admit_lap) return false;
-  return index < near_end || !demuxer.seekable();
+  if (!next_index || index < *next_index) return false;
+  return index < near_end || demux_lap > admit_lap || !demuxer.seekable();
 }
 
 bool State::ready(const Slot& slot) const {
