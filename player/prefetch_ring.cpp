@@ -50,7 +50,9 @@ bool State::admit_one() {
   });
   const bool known = found != segments.end();
   // Frames of segments that never came are lost at once.
-  if (!known && !(demux_lap > admit_lap || index < come_end || ended)) return false;
+  const bool passed =
+      demux_lap > admit_lap || (demux_lap == admit_lap && (index < come_end || ended));
+  if (!known && !passed) return false;
   std::size_t expected = 0;
   for (std::size_t t = 0; known && t < tracks.size(); ++t) {
     if ((*found->wanted)[t] != 0) expected += tracks[t]->picture_bytes;
