@@ -9,11 +9,10 @@
 #include "container/base/result.hpp"
 #include "container/reader.hpp"
 #include "gles/plane_set.hpp"
+#include "player/path_chooser.hpp"
 
 /// What playing a clip will take, before anything large is allocated (design, section 5).
 namespace relit::player {
-
-enum class CompositePath;
 
 /// The largest segment of a clip. Zeros: unknown, as of a source that cannot seek.
 struct SegmentScale {
@@ -41,10 +40,12 @@ struct MemoryWishes {
   int layers = -1;                ///< the first so many; -1: all
   int threads = 1;                ///< decode workers, 1 to 64
   std::uint64_t ring_frames = 0;  ///< decoded ahead; 0: a quarter of a second, 4 to 16. At least 2
-  std::optional<DrawingScale> drawing;  ///< none: no GL, as `relit stream`
-  CompositePath path{};                 ///< kAuto holds what each of the paths needs
+  std::optional<DrawingScale> drawing;        ///< none: no GL, as `relit stream`
+  CompositePath path = CompositePath::kAuto;  ///< kAuto holds what each of the paths needs
   gles::LightMapFormat light_map = gles::LightMapFormat::kAuto;
   bool composite = true;  ///< false: planes are decoded and no more
+  std::uint64_t light_bytes =
+      0;  ///< that the caller's lights hold, pictures of environments above all
 };
 
 /// One line of the account. Heap is what malloc gives (thread stacks, code and the GL driver's own
@@ -75,7 +76,7 @@ struct MemoryPlan {
   std::uint64_t frame_bytes = 0;  ///< one of them
   int threads = 1;
   std::vector<std::uint8_t> layers;  ///< by layer of the clip's model, 0: left out
-  CompositePath path{};
+  CompositePath path = CompositePath::kAuto;
   gles::LightMapFormat light_map = gles::LightMapFormat::kHalfFloat;
   std::vector<MemoryTerm> terms;      ///< all of them, in the order of allocation
   std::vector<std::string> given_up;  ///< sentences, in the order of sacrifice; empty: nothing
