@@ -19,7 +19,8 @@ Result<CompositePath> parse_composite_path(const std::string& name) {
   for (std::size_t i = 0; i < kNames.size(); ++i) {
     if (name == kNames[i]) return static_cast<CompositePath>(i);
   }
-  return fail(ErrorCode::kInvalid, "--composite " + name + ": it must be auto, cpu, texture or fused");
+  return fail(ErrorCode::kInvalid,
+              "--composite " + name + ": it must be auto, cpu, texture or fused");
 }
 
 const char* composite_path_name(CompositePath path) { return kNames[index(path)]; }
@@ -27,7 +28,8 @@ const char* composite_path_name(CompositePath path) { return kNames[index(path)]
 PathChooser::PathChooser(std::array<bool, kCompositePaths> available) : available_(available) {
   available_[index(CompositePath::kAuto)] = false;
   available_[index(CompositePath::kCpu)] = true;
-  path_ = available_[index(CompositePath::kTexture)] ? CompositePath::kTexture : CompositePath::kCpu;
+  path_ =
+      available_[index(CompositePath::kTexture)] ? CompositePath::kTexture : CompositePath::kCpu;
 }
 
 bool PathChooser::wants_measuring(double covered_pixels) {
