@@ -8,6 +8,7 @@
 #include "decoders/decoder_memory.hpp"
 #include "decoders/image.hpp"
 #include "decoders/plane_decoder.hpp"
+#include "player/relighter.hpp"
 #include "player/video_tracks.hpp"
 
 namespace relit::player {
@@ -129,6 +130,11 @@ std::uint64_t light_map_texel_bytes(gles::LightMapFormat format) {
   return format == gles::LightMapFormat::kFloat ? 16 : 8;
 }
 
+/// gles::Compositor looks at 256 samples of every plane of two frames to find a square root's peak.
+std::uint64_t sample_bytes(gles::LightMapFormat format, std::uint64_t planes) {
+  return format == gles::LightMapFormat::kSquareRoot8 ? 2 * planes * 256 * sizeof(float) : 0;
+}
+
 /// gles::Framebuffer::gpu_bytes() of a context with four samples a pixel.
 std::uint64_t framebuffer_bytes(const DrawingScale& drawing) {
   const std::uint64_t pixels = static_cast<std::uint64_t>(drawing.framebuffer_width) *
@@ -163,7 +169,10 @@ Result<MemoryAccount> MemoryAccount::create(const FileContents& contents,
   }
   account.measure_layers();
   account.measure_poses();
-  if (account.drawn()) account.measure_images();
+  if (account.drawn()) {
+    account.measure_images();
+    account.measure_sheets();
+  }
   return account;
 }
 
@@ -265,6 +274,17 @@ void MemoryAccount::measure_images() {
   }
 }
 
+// The compositor makes room for the planes of all layers, also those that are never decoded.
+void MemoryAccount::measure_sheets() {
+  const std::vector<LayerRecord> layers = contents_->layers_of(model_->id);
+  const gles::PlaneSetDescription description = describe_planes(*model_, layers);
+  plane_count_ = description.planes.size();
+  const auto measured = gles::PlaneSheets::measure(description, wishes_.drawing->max_texture_size);
+  // What does not fit into textures is composited on the CPU.
+  sheets_possible_ = measured.has_value();
+  if (measured) sheets_ = *measured;
+}
+
 std::uint64_t MemoryAccount::frame_bytes(std::size_t layers) const {
   std::uint64_t sum = pose_frame_bytes_;
   for (std::size_t l = 0; l < std::min(layers, layers_.size()); ++l) {
@@ -333,15 +353,38 @@ void MemoryAccount::add_decoding(std::vector<MemoryTerm>& terms, const MemoryCho
                    pose_fixed_bytes_ + segments * pose_segment_bytes_});
 }
 
+// Relighter's buffers. Where the governor halves the light map it makes a second one of a quarter
+// of the texels.
 void MemoryAccount::add_composite(std::vector<MemoryTerm>& terms,
                                   const MemoryChoice& choice) const {
-  const std::uint64_t texels = std::uint64_t{model_->width} * model_->height;
+  const auto half = [](std::uint64_t side) { return (side + 1) / 2; };
+  const std::uint64_t full = std::uint64_t{model_->width} * model_->height;
+  const std::uint64_t quarter = half(model_->width) * half(model_->height);
   const std::uint64_t texel = light_map_texel_bytes(choice.light_map);
   const bool any = choice.path == CompositePath::kAuto;
-  if (any || choice.path == CompositePath::kCpu || !drawn()) {
-    const std::uint64_t staged = drawn() ? texels * texel : 0;
+  const bool on_cpu = any || choice.path == CompositePath::kCpu || !drawn() || !sheets_possible_;
+  const bool on_gpu = choice.path != CompositePath::kCpu && drawn() && sheets_possible_;
+  std::uint64_t spare_heap = 0, spare_gpu = 0;
+  if (on_cpu) {
     terms.push_back({"cpu composite", "the light map as floats, and as it is uploaded",
-                     texels * 3 * sizeof(float) + staged, drawn() ? 2 * texels * texel : 0});
+                     full * 3 * sizeof(float) + (drawn() ? full * texel : 0),
+                     drawn() ? 2 * full * texel : 0});
+    spare_heap += quarter * texel;
+    spare_gpu += 2 * quarter * texel;
+  }
+  if (on_gpu) {
+    terms.push_back({"plane textures", "planes as they were decoded, of two frames",
+                     sheets_.cpu + sample_bytes(choice.light_map, plane_count_), sheets_.gpu});
+    terms.push_back({"light map", "the texture that is composited into", 0, full * texel});
+    spare_gpu += quarter * texel;
+    // Square roots of two frames do not add up: each gets a map of its own, and a third joins them.
+    if (choice.light_map == gles::LightMapFormat::kSquareRoot8) {
+      spare_gpu += 2 * (full + quarter) * texel;
+    }
+  }
+  if (drawn()) {
+    terms.push_back({"light map at half size", "for when playback is behind, and for blends",
+                     spare_heap, spare_gpu});
   }
 }
 
