@@ -124,12 +124,10 @@ Status PlaneEncoder::open_layers() {
     for (const auto& state : states_) {
       RELIT_TRY(open_layer(*state, keeping));
       const LayerRecord& record = state->plan.record;
-      const auto add = [&](const decoders::VideoFormat& format, int pictures) {
-        const auto memory = decoders::decoder_memory(format, pictures, 1);
-        decoder_bytes_ += memory.pictures * memory.picture_bytes;
-      };
-      add(decoders::mantissa_format(record), record.mantissa_pictures);
-      if (record.has_exponents) add(decoders::exponent_format(record), record.exponent_pictures);
+      RELIT_TRY(count_pictures(decoders::mantissa_format(record), record.mantissa_pictures));
+      if (record.has_exponents) {
+        RELIT_TRY(count_pictures(decoders::exponent_format(record), record.exponent_pictures));
+      }
     }
     if (budget == 0 || decoder_bytes_ <= budget) return {};
   }
@@ -138,6 +136,12 @@ Status PlaneEncoder::open_layers() {
                                        "of the decoders take at least " +
                                        std::to_string(decoder_bytes_) +
                                        " bytes; use a smaller --size or --order, or --bit-depth 8");
+}
+
+Status PlaneEncoder::count_pictures(const decoders::VideoFormat& format, int pictures) {
+  RELIT_ASSIGN(const std::uint64_t bytes, decoders::picture_buffer_bytes(format));
+  decoder_bytes_ += bytes * decoders::decoder_memory(format, pictures, 1).pictures;
+  return {};
 }
 
 Status PlaneEncoder::open_layer(LayerState& layer, const Keeping& keeping) {

@@ -14,6 +14,7 @@
 #include "bake_minimal/video_encoder.hpp"
 #include "container/base/result.hpp"
 #include "container/records.hpp"
+#include "decoders/video_decoder.hpp"
 
 /// Transfer -> layers and their packets (design, section 4).
 namespace relit::bake {
@@ -86,6 +87,7 @@ class PlaneEncoder {
   };
   [[nodiscard]] static std::vector<Keeping> keepings(const CodingOptions& options);
   Status open_layers();
+  Status count_pictures(const decoders::VideoFormat& format, int pictures);
   Status open_layer(LayerState& layer, const Keeping& keeping);
   Status encode_layer(LayerState& layer, std::span<const float> transfer);
   Status quantise_tile(LayerState& layer, std::size_t tile, std::span<const float> transfer);

@@ -199,11 +199,19 @@ Status MemoryAccount::find_records(const FileContents& contents) {
 
 void MemoryAccount::measure_layers() {
   std::uint64_t plain_frame = 0;
+  const auto add = [](Layer& layer, const decoders::VideoFormat& format, int pictures,
+                      bool mantissas) {
+    // What no decoder here takes is refused when it is opened.
+    const auto padded = decoders::picture_buffer_bytes(format);
+    const std::uint64_t plain =
+        decoders::picture_bytes(format.width, format.height, format.chroma, format.bit_depth);
+    layer.tracks.push_back({format, pictures, padded ? *padded : plain, mantissas});
+  };
   for (Layer& layer : layers_) {
     const LayerRecord& record = *layer.record;
-    layer.tracks.push_back({decoders::mantissa_format(record), record.mantissa_pictures, true});
+    add(layer, decoders::mantissa_format(record), record.mantissa_pictures, true);
     if (record.has_exponents) {
-      layer.tracks.push_back({decoders::exponent_format(record), record.exponent_pictures, false});
+      add(layer, decoders::exponent_format(record), record.exponent_pictures, false);
     }
     for (const Track& track : layer.tracks) {
       const decoders::VideoFormat& f = track.format;
@@ -288,9 +296,7 @@ void MemoryAccount::measure_sheets() {
 std::uint64_t MemoryAccount::frame_bytes(std::size_t layers) const {
   std::uint64_t sum = pose_frame_bytes_;
   for (std::size_t l = 0; l < std::min(layers, layers_.size()); ++l) {
-    for (const Track& track : layers_[l].tracks) {
-      sum += decoders::decoder_memory(track.format, track.pictures, 1).picture_bytes;
-    }
+    for (const Track& track : layers_[l].tracks) sum += track.picture_bytes;
   }
   return sum;
 }
@@ -333,7 +339,7 @@ void MemoryAccount::add_decoding(std::vector<MemoryTerm>& terms, const MemoryCho
           decoders::decoder_memory(track.format, track.pictures, track.mantissas ? threads : 1);
       ++streams;
       contexts += memory.context_bytes;
-      references += memory.picture_bytes * (memory.pictures + kFramesAhead);
+      references += track.picture_bytes * (memory.pictures + kFramesAhead);
     }
   }
   const std::uint64_t segments = segments_held(choice.ring_frames);

@@ -47,7 +47,8 @@ class MemoryAccount {
   MemoryAccount() = default;
   struct Track {
     decoders::VideoFormat format;
-    int pictures = 1;        ///< by the file
+    int pictures = 1;  ///< by the file
+    std::uint64_t picture_bytes = 0;
     bool mantissas = false;  ///< the others are decoded on one thread
   };
   struct Layer {

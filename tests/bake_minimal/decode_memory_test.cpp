@@ -17,7 +17,9 @@ std::uint64_t decoder_bytes(const Encoded& encoded) {
   for (const container::LayerRecord& layer : encoded.layers) {
     const auto add = [&](const decoders::VideoFormat& format, int pictures) {
       const auto memory = decoders::decoder_memory(format, pictures, 1);
-      sum += memory.pictures * memory.picture_bytes;
+      const auto bytes = decoders::picture_buffer_bytes(format);
+      REQUIRE(bytes);
+      sum += memory.pictures * *bytes;
     };
     add(decoders::mantissa_format(layer), layer.mantissa_pictures);
     if (layer.has_exponents) add(decoders::exponent_format(layer), layer.exponent_pictures);

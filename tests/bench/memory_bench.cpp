@@ -2,14 +2,16 @@
 // memory_bench FILE BUDGET: plays a clip once within its memory plan, the ring of decoded frames
 // full from the first to the last, composited on the CPU, for a heap profiler to watch. Prints the
 // plan's account of the heap in bytes, or "refused BYTES" with the smallest budget that would do.
+#include <algorithm>
 #include <cstdio>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "decoders/composite.hpp"
-#include "decoders/ffmpeg.hpp"
-#include "player/clip_reader.hpp"
+#include "player/clip_demuxer.hpp"
 #include "player/memory_plan.hpp"
+#include "player/prefetcher.hpp"
 #include "player/relighter.hpp"
 
 using namespace relit;
@@ -54,18 +56,28 @@ Status play(const std::string& path, std::uint64_t budget) {
   RELIT_ASSIGN(const std::optional<MemoryPlan> plan, make_plan(path, budget));
   if (!plan) return {};
   RELIT_ASSIGN(auto source, container::FileSource::open(path));
-  ClipOptions options;
-  options.layers = plan->layer_count();
+  RELIT_ASSIGN(ClipDemuxer demuxer, ClipDemuxer::open(std::move(source), path, {}));
+  RELIT_ASSIGN(auto pool, WorkerPool::create(plan->threads));
+  PrefetchOptions options;
+  options.ring_bytes = plan->ring_bytes;
+  options.packet_bytes = plan->packet_bytes;
   options.threads = plan->decoder_threads;
-  RELIT_ASSIGN(ClipReader clip, ClipReader::open(std::move(source), path, options));
-  RELIT_ASSIGN(auto relighter, Relighter::create(clip.model(), clip.layers(), {}));
+  options.layers = plan->layers;
+  options.impatient = false;
+  RELIT_ASSIGN(auto clip, Prefetcher::create(std::move(demuxer), pool, options));
+  RELIT_ASSIGN(auto relighter, Relighter::create(clip->model(), clip->layers(), {}));
   RELIT_TRY(relighter->set_light(white(), plan->layers));
-  std::vector<ClipFrame> ring(plan->ring_frames);
-  for (std::uint64_t k = 0; k < clip.clip().frame_count; ++k) {
-    ClipFrame& frame = ring[k % ring.size()];
-    frame.planes.clear();
-    RELIT_TRY(clip.frame(k, frame));
-    RELIT_TRY(relighter->composite({&frame.planes, nullptr, 0}));
+  for (std::uint64_t k = 0; k < clip->clip().frame_count; ++k) {
+    clip->want(k);
+    RELIT_ASSIGN(bool come, clip->wait(k, 600));
+    const ClipFrame* frame = come ? clip->frame(k) : nullptr;
+    // The ring has room for so many, this one included.
+    const std::uint64_t last = std::min(k + plan->ring_frames, clip->clip().frame_count) - 1;
+    if (frame != nullptr) {
+      RELIT_ASSIGN(come, clip->wait(last, 600));
+    }
+    if (frame == nullptr || !come) return fail(ErrorCode::kCorrupt, "a frame has not come");
+    RELIT_TRY(relighter->composite({&frame->planes, nullptr, 0}));
   }
   std::printf("%llu heap, %llu frames ahead, %d of %zu layers\n",
               static_cast<unsigned long long>(plan->heap_bytes()),
