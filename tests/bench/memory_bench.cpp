@@ -73,10 +73,17 @@ Status play(const std::string& path, std::uint64_t budget) {
     const ClipFrame* frame = come ? clip->frame(k) : nullptr;
     // The ring has room for so many, this one included.
     const std::uint64_t last = std::min(k + plan->ring_frames, clip->clip().frame_count) - 1;
-    if (frame != nullptr) {
-      RELIT_ASSIGN(come, clip->wait(last, 600));
+    if (frame == nullptr) return fail(ErrorCode::kCorrupt, "a frame has not come");
+    // The ring fills once; from then on it stays full.
+    if (k == 0) {
+      RELIT_ASSIGN(come, clip->wait(last, 3));
+      if (!come) {
+        const PrefetchStats stats = clip->stats();
+        std::fprintf(stderr, "memory_bench: %zu frames, %zu of %llu bytes, are ahead\n",
+                     stats.ring_frames, stats.ring_bytes,
+                     static_cast<unsigned long long>(plan->ring_bytes));
+      }
     }
-    if (frame == nullptr || !come) return fail(ErrorCode::kCorrupt, "a frame has not come");
     RELIT_TRY(relighter->composite({&frame->planes, nullptr, 0}));
   }
   std::printf("%llu heap, %llu frames ahead, %d of %zu layers\n",
