@@ -146,6 +146,14 @@ std::uint64_t framebuffer_bytes(const DrawingScale& drawing) {
   return sum;
 }
 
+/// Of the pictures that a decoder keeps, those that have been shown: a ring that reaches back to
+/// them holds the same buffers. All but the one being decoded and those that wait for their turn,
+/// two where references form a pyramid (five pictures and more), else one.
+std::uint64_t shown_references(int pictures) {
+  const int waiting = pictures >= 5 ? 2 : 1;
+  return static_cast<std::uint64_t>(std::max(pictures - 1 - waiting, 0));
+}
+
 std::string count_of(std::uint64_t count, const char* one, const char* many) {
   return std::to_string(count) + " " + (count == 1 ? one : many);
 }
@@ -339,7 +347,8 @@ void MemoryAccount::add_decoding(std::vector<MemoryTerm>& terms, const MemoryCho
           decoders::decoder_memory(track.format, track.pictures, track.mantissas ? threads : 1);
       ++streams;
       contexts += memory.context_bytes;
-      references += track.picture_bytes * (memory.pictures + kFramesAhead);
+      const std::uint64_t shared = std::min(choice.ring_frames, shown_references(track.pictures));
+      references += track.picture_bytes * (memory.pictures + kFramesAhead - shared);
     }
   }
   const std::uint64_t segments = segments_held(choice.ring_frames);
@@ -347,8 +356,9 @@ void MemoryAccount::add_decoding(std::vector<MemoryTerm>& terms, const MemoryCho
                    count_of(streams, "decoder", "decoders") + " on " +
                        count_of(static_cast<std::uint64_t>(choice.threads), "thread", "threads"),
                    contexts});
-  terms.push_back(
-      {"references", "pictures that the decoders refer to, reorder and work on", references});
+  terms.push_back({"references",
+                   "pictures outside the ring that the decoders refer to, reorder and work on",
+                   references});
   terms.push_back({"ring",
                    count_of(choice.ring_frames, "frame", "frames") + " decoded ahead of " +
                        std::to_string(frame_bytes(choice.layers)) + " bytes",
