@@ -59,7 +59,7 @@ FileContents contents() {
 
 MemoryWishes drawn() {
   MemoryWishes wishes;
-  wishes.threads = 4;
+  wishes.threads = 12;
   wishes.drawing.emplace();
   return wishes;
 }
@@ -101,7 +101,7 @@ TEST_CASE("a memory plan grants every wish where nothing bounds it") {
   const FileContents file = contents();
   const MemoryPlan p = plan(file, drawn());
   CHECK(p.ring_frames == 12);  // a quarter of a second at 50 frames/s
-  CHECK(p.threads == 4);
+  CHECK(p.threads == 12);
   CHECK(p.layers == std::vector<std::uint8_t>{1, 1, 1});
   CHECK(p.path == CompositePath::kAuto);
   CHECK(p.light_map == gles::LightMapFormat::kHalfFloat);
@@ -144,7 +144,7 @@ TEST_CASE("nothing dearer is given up where something cheaper would do") {
   shortest.ring_frames = 2;
   const std::uint64_t with_threads = plan(file, shortest).total_bytes();
   const MemoryPlan slower = plan(file, drawn(), with_threads - 1);
-  CHECK(slower.threads < 4);
+  CHECK(slower.threads < 12);
   CHECK(slower.path == CompositePath::kAuto);
   CHECK(slower.layer_count() == 3);
 }
