@@ -76,7 +76,7 @@ Status play(const std::string& path, std::uint64_t budget) {
     if (frame == nullptr) return fail(ErrorCode::kCorrupt, "a frame has not come");
     // The ring fills once; from then on it stays full.
     if (k == 0) {
-      RELIT_ASSIGN(come, clip->wait(last, 3));
+      RELIT_ASSIGN(come, clip->wait(last, 60));
       if (!come) {
         const PrefetchStats stats = clip->stats();
         std::fprintf(stderr, "memory_bench: %zu frames, %zu of %llu bytes, are ahead\n",
