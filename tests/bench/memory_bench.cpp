@@ -74,9 +74,9 @@ Status play(const std::string& path, std::uint64_t budget) {
     // The ring has room for so many, this one included.
     const std::uint64_t last = std::min(k + plan->ring_frames, clip->clip().frame_count) - 1;
     if (frame == nullptr) return fail(ErrorCode::kCorrupt, "a frame has not come");
-    // The ring fills once; from then on it stays full.
-    if (k == 0) {
-      RELIT_ASSIGN(come, clip->wait(last, 60));
+    // The ring fills once, and from then on lacks one frame, the last, at most.
+    if (const std::uint64_t behind = k == 0 ? 0 : 1; last - behind > k) {
+      RELIT_ASSIGN(come, clip->wait(last - behind, 60));
       if (!come) {
         const PrefetchStats stats = clip->stats();
         std::fprintf(stderr, "memory_bench: %zu frames, %zu of %llu bytes, are ahead\n",
