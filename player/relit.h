@@ -336,8 +336,8 @@ RELIT_API relit_result relit_play_sequence(relit_player* player,
                                            int32_t loop) RELIT_NOEXCEPT;
 
 RELIT_API relit_result relit_set_paused(relit_player* player, int32_t paused) RELIT_NOEXCEPT;
-/// 1 is real time, 0 stands still, at most 100; backwards is RELIT_UNSUPPORTED. RELIT_INVALID where
-/// it is not finite.
+/// 1 is real time, 0 stands still, below 0 goes backwards, where the source can seek. RELIT_INVALID
+/// where it is not finite or beyond ±100.
 RELIT_API relit_result relit_set_speed(relit_player* player, double speed) RELIT_NOEXCEPT;
 RELIT_API relit_result relit_set_loop(relit_player* player, relit_loop loop) RELIT_NOEXCEPT;
 /// To a time of the clip or sequence. Before the start counts as the start, beyond the end as the
