@@ -2,58 +2,65 @@
 # shared library), dev (header, static library, what finds them), bake.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
-set(install_sources ${CMAKE_CURRENT_LIST_DIR}/install)
+set(here ${CMAKE_CURRENT_LIST_DIR})
+set(made ${PROJECT_BINARY_DIR}/install)
 
 # Both are made of the same objects; nothing of a folder is compiled again.
 set(objects)
 foreach(folder container decoders gles player)
   list(APPEND objects $<TARGET_OBJECTS:relit_${folder}>)
 endforeach()
-set(libraries PkgConfig::AVFORMAT PkgConfig::AVCODEC PkgConfig::AVUTIL PkgConfig::SWSCALE PkgConfig::ZSTD
-  meshoptimizer::meshoptimizer Threads::Threads ${CMAKE_DL_LIBS})
 
-add_library(relit_shared SHARED ${objects})
-set_target_properties(relit_shared PROPERTIES OUTPUT_NAME relit EXPORT_NAME relit LINKER_LANGUAGE CXX
-  VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR}
-  LINK_DEPENDS ${install_sources}/librelit.map)
-target_link_libraries(relit_shared PRIVATE ${libraries})
-target_link_options(relit_shared PRIVATE -Wl,--no-undefined -Wl,--version-script=${install_sources}/librelit.map)
-target_include_directories(relit_shared INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
-
-add_library(relit_static STATIC ${objects})
-set_target_properties(relit_static PROPERTIES OUTPUT_NAME relit LINKER_LANGUAGE CXX)
+if(RELIT_SHARED)
+  add_library(relit_shared SHARED ${objects})
+  set_target_properties(relit_shared PROPERTIES OUTPUT_NAME relit EXPORT_NAME relit LINKER_LANGUAGE CXX
+    VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR} LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/lib
+    LINK_DEPENDS ${here}/install/librelit.map)
+  target_link_libraries(relit_shared PRIVATE PkgConfig::AVFORMAT PkgConfig::AVCODEC PkgConfig::AVUTIL
+    PkgConfig::SWSCALE PkgConfig::ZSTD meshoptimizer::meshoptimizer Threads::Threads ${CMAKE_DL_LIBS})
+  # What is not relit_* stays inside, templates of the standard library included.
+  target_link_options(relit_shared PRIVATE -Wl,--no-undefined -Wl,--as-needed
+    -Wl,--version-script=${here}/install/librelit.map)
+  target_include_directories(relit_shared INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+  install(TARGETS relit_shared EXPORT relitTargets
+    LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT runtime NAMELINK_COMPONENT dev)
+endif()
+if(RELIT_STATIC)
+  add_library(relit_static STATIC ${objects})
+  set_target_properties(relit_static PROPERTIES OUTPUT_NAME relit LINKER_LANGUAGE CXX
+    ARCHIVE_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/lib)
+  install(TARGETS relit_static ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT dev)
+endif()
 
 install(TARGETS relit RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT runtime)
-install(TARGETS relit_shared EXPORT relitTargets
-  LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT runtime NAMELINK_COMPONENT dev)
-install(TARGETS relit_static ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT dev)
-install(FILES relit.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT dev)
+install(FILES ${here}/relit.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT dev)
 
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/relit)
-install(EXPORT relitTargets NAMESPACE relit:: DESTINATION ${package_dir} COMPONENT dev)
-configure_package_config_file(${install_sources}/relitConfig.cmake.in relitConfig.cmake
+if(RELIT_SHARED)
+  install(EXPORT relitTargets NAMESPACE relit:: DESTINATION ${package_dir} COMPONENT dev)
+endif()
+configure_package_config_file(${here}/install/relitConfig.cmake.in ${made}/relitConfig.cmake
   INSTALL_DESTINATION ${package_dir} PATH_VARS CMAKE_INSTALL_LIBDIR CMAKE_INSTALL_INCLUDEDIR)
-write_basic_package_version_file(relitConfigVersion.cmake COMPATIBILITY SameMinorVersion)
-install(FILES ${CMAKE_CURRENT_BINARY_DIR}/relitConfig.cmake ${CMAKE_CURRENT_BINARY_DIR}/relitConfigVersion.cmake
-  DESTINATION ${package_dir} COMPONENT dev)
+write_basic_package_version_file(${made}/relitConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${made}/relitConfig.cmake ${made}/relitConfigVersion.cmake DESTINATION ${package_dir} COMPONENT dev)
 
 # From the .pc file to the prefix, so that the tree may be moved.
 file(RELATIVE_PATH relit_prefix_from_pc /prefix/${CMAKE_INSTALL_LIBDIR}/pkgconfig /prefix)
-configure_file(${install_sources}/relit.pc.in relit.pc @ONLY)
-install(FILES ${CMAKE_CURRENT_BINARY_DIR}/relit.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT dev)
+configure_file(${here}/install/relit.pc.in ${made}/relit.pc @ONLY)
+install(FILES ${made}/relit.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT dev)
 
-install(FILES man/relit.1 DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT runtime)
-install(FILES install/relit.bash DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions
+install(FILES ${here}/man/relit.1 DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT runtime)
+install(FILES ${here}/install/relit.bash DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions
   COMPONENT runtime RENAME relit)
-install(FILES install/_relit DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/vendor-completions COMPONENT runtime)
-install(DIRECTORY examples DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT dev)
+install(FILES ${here}/install/_relit DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/vendor-completions COMPONENT runtime)
+install(DIRECTORY ${here}/examples DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT dev)
 
 if(RELIT_BAKE)
   install(TARGETS relit-bake RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT bake)
-  install(FILES man/relit-bake.1 DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT bake)
-  install(FILES install/relit-bake.bash DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions
+  install(FILES ${here}/man/relit-bake.1 DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT bake)
+  install(FILES ${here}/install/relit-bake.bash DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions
     COMPONENT bake RENAME relit-bake)
-  install(FILES install/_relit-bake DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/vendor-completions COMPONENT bake)
+  install(FILES ${here}/install/_relit-bake DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/vendor-completions COMPONENT bake)
 endif()
 
 set(packages runtime=relit dev=relit-dev)

@@ -168,8 +168,8 @@ RELIT_API relit_result relit_open_options_default(relit_open_options* options,
 /// frame and begins to decode. `options` may be NULL and can go when this returns. Returns what
 /// reading gives, RELIT_NOT_FOUND for a clip that is not there, RELIT_OUT_OF_MEMORY for a budget
 /// that cannot do. Whatever the result, *player is set: to a player that has failed and only knows
-/// relit_last_error() and relit_close(), or to NULL where there was not enough memory even for that
-/// or an argument was wrong. The host closes it. Any thread, which then owns the player.
+/// relit_last_error() and relit_close(), or to NULL where there was not enough memory even for
+/// that. The host closes it. Any thread, which then owns the player.
 RELIT_API relit_result relit_open(const char* source, const relit_open_options* options,
                                   relit_player** player) RELIT_NOEXCEPT;
 
@@ -207,8 +207,8 @@ RELIT_API relit_result relit_open_callbacks(const relit_source* source,
 /// source to come back.
 RELIT_API void relit_close(relit_player* player) RELIT_NOEXCEPT;
 
-/// Why the last call on this player failed, in words; "" where none has. Valid until the next call
-/// on it. NULL gives "".
+/// Why the last call on this player that failed did so, in words; "" where none has. Valid until
+/// the next call on it. Asked from another thread than the player's, it says that. NULL gives "".
 RELIT_API const char* relit_last_error(const relit_player* player) RELIT_NOEXCEPT;
 
 /// Makes reads and waits in progress end with RELIT_CANCELLED, for good: only relit_close() is left
@@ -366,9 +366,10 @@ typedef struct relit_moment {
 
 /// Once a display frame: moves the clock to `now_ns`, a monotonic time of the host's choosing,
 /// takes the frames that are there, lets the governor decide, and composites if frame, light or
-/// quality changed. Never waits for the source. The clock starts with the first call at which a
-/// picture is ready; a time that runs backwards counts as no time. `moment` may be NULL. Returns
-/// errors of the source (once; playback then stands on the last picture).
+/// quality changed. Does not wait for frames: one that is not here is late, and what stays late for
+/// a quarter of a second makes the clock stand until it comes. The clock starts with the first call
+/// at which a picture is ready; a time that runs backwards counts as no time. `moment` may be NULL.
+/// Returns errors of the source, each once; playback then stands on the last picture.
 RELIT_API relit_result relit_update(relit_player* player, int64_t now_ns,
                                     relit_moment* moment) RELIT_NOEXCEPT;
 
@@ -470,9 +471,13 @@ typedef struct relit_light_map {
 RELIT_API relit_result relit_light_map_texture(relit_player* player,
                                                relit_light_map* map) RELIT_NOEXCEPT;
 
+/// Of the light map, texels: as relit_clip_info says, or half of it where the governor gave that
+/// up.
+RELIT_API relit_result relit_light_map_size(relit_player* player, int32_t* width,
+                                            int32_t* height) RELIT_NOEXCEPT;
 /// The light map as numbers: [3][height][width] radiance for albedo 1, negative where the light
-/// rings. `count` is 3 × height × width of the clip, else RELIT_INVALID. Headless, or by reading
-/// the texture back. RELIT_NOT_FOUND before the first picture.
+/// rings. `count` is 3 × height × width, else RELIT_INVALID. Headless, or by reading the texture
+/// back. RELIT_NOT_FOUND before the first picture.
 RELIT_API relit_result relit_light_map_pixels(relit_player* player, float* out,
                                               size_t count) RELIT_NOEXCEPT;
 

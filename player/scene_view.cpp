@@ -66,7 +66,7 @@ Result<std::unique_ptr<SceneView>> SceneView::create(const ClipReader& clip,
   RELIT_ASSIGN(scene->view_.tone_map, parse_tone_map(options.tone_map));
   RELIT_ASSIGN(scene->relighter_,
                Relighter::create(clip.model(), clip.layers(), &device, options.composite_on_gpu));
-  RELIT_ASSIGN(scene->character_, Character::create(clip, device));
+  RELIT_ASSIGN(scene->character_, Character::create(clip.contents(), clip.meshes(), device));
   return scene;
 }
 
