@@ -22,6 +22,10 @@ namespace relit::decoders {
 /// from frame to frame, so that nothing is allocated.
 class FrameView {
  public:
+  FrameView() = default;
+  /// Of planes that the caller owns and keeps, as from a decoder of a host's own.
+  FrameView(std::uint64_t frame, std::vector<PlaneView> planes)
+      : frame_(frame), planes_(std::move(planes)) {}
   [[nodiscard]] std::span<const PlaneView> planes() const { return planes_; }
   [[nodiscard]] std::uint64_t frame() const { return frame_; }
   /// Gives the pictures back to their decoders; all views become empty.

@@ -5,6 +5,7 @@
 #include "decoders/npy.hpp"
 #include "gles/picture.hpp"
 #include "player/command.hpp"
+#include "player/gl_backend.hpp"
 #include "player/picture_writer.hpp"
 #include "player/scene_view.hpp"
 
@@ -13,7 +14,8 @@ namespace {
 
 struct Arguments {
   SourceArguments source;
-  std::string output, clip, frame, frames, camera, sheet, backend = "egl", size = "512x512";
+  std::string output, clip, frame, frames, camera, sheet, backend = "egl", composite,
+                                                          size = "512x512";
   LightArguments light;
   ViewOptions view;
   double time_s = -1;
@@ -67,14 +69,21 @@ Result<FrameRange> chosen_frames(const Arguments& arguments, ClipReader& reader)
   return range;
 }
 
+// As asked for, by --composite or else by the backend.
+Result<CompositePath> chosen_path(const Arguments& arguments, Backend backend) {
+  if (!arguments.composite.empty()) return parse_composite_path(arguments.composite);
+  return backend == Backend::kCpu ? CompositePath::kCpu : CompositePath::kTexture;
+}
+
 Status render_lightmap(const Arguments& arguments, ClipReader& clip, const LoadedLight& light,
                        Backend backend) {
   GlBackend gl;
-  if (backend != Backend::kCpu) {
+  RELIT_ASSIGN(const CompositePath path, chosen_path(arguments, backend));
+  if (path != CompositePath::kCpu) {
     RELIT_ASSIGN(gl, open_backend(backend));
   }
-  RELIT_ASSIGN(auto relighter, Relighter::create(clip.model(), clip.layers(), gl.device.get(),
-                                                 backend != Backend::kCpu));
+  RELIT_ASSIGN(auto relighter,
+               Relighter::create(clip.model(), clip.layers(), {gl.device.get(), path}));
   RELIT_TRY(relighter->set_light(light.light, decoded_layers(clip, arguments.layers)));
   RELIT_ASSIGN(const FrameRange range, chosen_frames(arguments, clip));
   std::vector<std::uint64_t> shape{3, clip.model().height, clip.model().width};
@@ -86,7 +95,7 @@ Status render_lightmap(const Arguments& arguments, ClipReader& clip, const Loade
   ClipFrame frame;
   for (std::uint64_t k = range.first; k <= range.last; ++k) {
     RELIT_TRY(clip.frame(k, frame));
-    RELIT_TRY(relighter->composite(frame.planes));
+    RELIT_TRY(relighter->composite({&frame.planes}));
     RELIT_TRY(relighter->read(map));
     RELIT_TRY(writer.write(std::span<const float>(map)));
   }
@@ -103,7 +112,7 @@ class PictureRenderer {
     std::unique_ptr<PictureRenderer> self(new PictureRenderer);
     ViewOptions options = arguments.view;
     options.layers = arguments.layers;
-    options.composite_on_gpu = backend != Backend::kCpu;
+    RELIT_ASSIGN(options.composite, chosen_path(arguments, backend));
     if (!arguments.camera.empty()) {
       RELIT_ASSIGN(options.camera, parse_camera(arguments.camera));
     }
@@ -241,6 +250,9 @@ Command add_render(CLI::App& app) {
   add_view_options(*command, a->view, a->camera);
   command->add_option("--backend", a->backend, "egl, egl-es2, egl-es2-mediump, osmesa or cpu")
       ->capture_default_str();
+  command->add_option("--composite", a->composite,
+                      "where planes are added up: auto, cpu, texture or fused; by default what the "
+                      "backend says");
   command->add_option("--layers", a->layers,
                       "only the first so many layers: faster and less accurate");
   command->add_option("--threads", a->threads, "of each decoder")

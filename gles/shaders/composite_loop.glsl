@@ -4,27 +4,26 @@
 uniform vec4 BATCH_DATA[BATCH_GROUPS * BATCH_STRIDE];
 uniform int BATCH_COUNT;
 
-vec3 BATCH_SUM(vec2 texel) {
+vec3 BATCH_SUM() {
   vec3 sum = vec3(0.0);
+  vec2 low, high;
   for (int i = 0; i < BATCH_GROUPS; ++i) {
     if (i >= BATCH_COUNT) break;
-    vec4 place = BATCH_DATA[i * BATCH_STRIDE];
     vec4 weight = BATCH_DATA[i * BATCH_STRIDE + 1];
-    float reference = weight.a;
-    vec3 group = weight.rgb * BATCH_MANTISSA(SAMPLE_2D(BATCH_SHEET_0, place.xy + texel * place.zw));
-#if BATCH_PLANES == 3
-    place = BATCH_DATA[i * BATCH_STRIDE + 2];
-    weight = BATCH_DATA[i * BATCH_STRIDE + 3];
-    group += weight.rgb * BATCH_MANTISSA(SAMPLE_2D(BATCH_SHEET_1, place.xy + texel * place.zw));
-    place = BATCH_DATA[i * BATCH_STRIDE + 4];
-    weight = BATCH_DATA[i * BATCH_STRIDE + 5];
-    group += weight.rgb * BATCH_MANTISSA(SAMPLE_2D(BATCH_SHEET_2, place.xy + texel * place.zw));
-#endif
+    TAPS share = TAPS(tap_share);
 #ifdef BATCH_EXPONENTS
-    place = BATCH_DATA[i * BATCH_STRIDE + BATCH_STRIDE - 1];
-    group *= power(SAMPLE_2D(BATCH_EXPONENTS, place.xy + texel * place.zw), reference);
+    tap_reference = weight.a;
+    AIM(BATCH_DATA[i * BATCH_STRIDE + BATCH_STRIDE - 1]);
+    share *= TAP(tap_power, BATCH_EXPONENTS);
 #endif
-    sum += group;
+    AIM(BATCH_DATA[i * BATCH_STRIDE]);
+    sum += weight.rgb * dot(TAP(BATCH_MANTISSA, BATCH_SHEET_0), share);
+#if BATCH_PLANES == 3
+    AIM(BATCH_DATA[i * BATCH_STRIDE + 2]);
+    sum += BATCH_DATA[i * BATCH_STRIDE + 3].rgb * dot(TAP(BATCH_MANTISSA, BATCH_SHEET_1), share);
+    AIM(BATCH_DATA[i * BATCH_STRIDE + 4]);
+    sum += BATCH_DATA[i * BATCH_STRIDE + 5].rgb * dot(TAP(BATCH_MANTISSA, BATCH_SHEET_2), share);
+#endif
   }
   return sum;
 }

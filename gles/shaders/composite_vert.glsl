@@ -1,5 +1,5 @@
 ATTRIBUTE vec2 a_position;
-uniform vec2 u_size;
+uniform vec4 u_texels;  // scale and offset from [0,1] to the planes' texels
 
 #ifdef LOOKUPS
 // Texture coordinates reach the fragment shader as varyings that it passes on unmodified: on GPUs
@@ -11,7 +11,7 @@ VARYING vec2 v_texel;
 #endif
 
 void main() {
-  vec2 texel = (a_position * 0.5 + 0.5) * u_size;
+  vec2 texel = (a_position * 0.5 + 0.5) * u_texels.xy + u_texels.zw;
 #ifdef LOOKUPS
   ASSIGN_PLACES
 #else
