@@ -53,7 +53,8 @@ struct SequenceItem {
   std::uint32_t repeats = 1;  ///< times that it is played, at least 1
   /// Over which it blends in from the item before, both of them moving: it begins so long before
   /// that one ends. 0: a cut. At most half of the shorter of the two (repeats included) is taken,
-  /// so that never more than two clips are seen. The first item's counts where the sequence loops.
+  /// so that never more than two clips are seen. The first item's counts where the sequence goes
+  /// round.
   double cross_fade_s = 0;
 };
 
@@ -120,7 +121,7 @@ class Playback {
   Status play_clip(std::size_t clip, double cross_fade_s = 0);
   /// Plays clips one after another, with `loop` round and round. `items` is copied. Errors,
   /// changing nothing: those of play_clip; kInvalid for no items or no repeats; kLimit for a length
-  /// beyond all use (272 years at the finest unit).
+  /// of more than 136 years.
   Status play_sequence(std::span<const SequenceItem> items, bool loop);
 
   void set_paused(bool paused) { paused_ = paused; }
@@ -139,9 +140,8 @@ class Playback {
   void seek_tick(std::uint64_t tick);
   Status seek_frame(std::uint64_t frame);
   /// Pauses, and goes to the start of the frame so many further on or back, round the ends of what
-  /// loops, else to the first or last. In a sequence the next frame after an item's last is the
-  /// next item's first that is its own. Errors, changing nothing: kNotFound as seek_frame(); kLimit
-  /// beyond ±kMostSteps in a sequence.
+  /// loops, else to the first or last. In a sequence it is the primary that steps. Errors, changing
+  /// nothing: kNotFound as seek_frame(); kLimit beyond ±kMostSteps in a sequence.
   Status step(std::int64_t frames);
 
   /// Moves the clock to `now_ns`, a monotonic time of the host's choosing, and says what to show.
@@ -150,8 +150,8 @@ class Playback {
   Moment at(std::int64_t now_ns);
   /// Lets the time up to `now_ns` pass without playing: before the first picture, or in a stall.
   void skip_to(std::int64_t now_ns) { last_ns_ = now_ns; }
-  /// What at() would say without moving the clock.
-  [[nodiscard]] Moment now();
+  /// What the last at() would say now, after a change.
+  [[nodiscard]] Moment now() { return look(); }
 
   [[nodiscard]] bool paused() const { return paused_; }
   [[nodiscard]] double speed() const;
@@ -161,60 +161,74 @@ class Playback {
   [[nodiscard]] double duration_s() const;
 
  private:
-  __extension__ using Int = __int128;
+  __extension__ typedef __int128 Int;
 
+  /// How far something has come in a clip: `x` in units of which a tick has `tick`.
+  struct Place {
+    std::size_t clip = 0;
+    Int x = 0;
+    Int tick = 1;
+    bool goes_round = false;  ///< after the last frame comes the first
+  };
   /// An item with its place in the program, in the program's units.
   struct Scheduled {
     std::size_t clip = 0;
     std::uint32_t repeats = 1;
-    Int tick = 1;    ///< length of a tick
     Int start = 0;   ///< from which it is the primary, blending in at first
     Int length = 0;  ///< all repeats
     Int fade = 0;    ///< from the item before
+    Int factor = 1;  ///< the program's units times this are those of `tick`
+    Int tick = 1;
   };
   /// What is being played: one clip, or a sequence.
   struct Program {
     std::vector<Scheduled> items;
     Int scale = 1;  ///< units in 2^-32 ns
-    Int total = 0;  ///< length of one round
+    Int end = 0;    ///< of the last item
     bool loop = false;
-    [[nodiscard]] bool single() const { return items.size() == 1 && items[0].repeats == 1; }
+    [[nodiscard]] bool is_clip() const { return items.size() == 1 && items[0].repeats == 1; }
   };
   /// A clip that play_clip() is blending over from, in units of its own.
   struct Outgoing {
-    std::size_t clip = 0;
-    bool loop = false;
-    Int tick = 1;
+    Place place;
     Int scale = 1;
-    Int position = 0;
     Int faded = 0;  ///< 2^-32 ns
     Int fade = 0;
   };
 
   Playback() = default;
   [[nodiscard]] Program program_of(std::size_t clip) const;
-  Status schedule(std::span<const SequenceItem> items, Program& program) const;
+  Result<Program> schedule(std::span<const SequenceItem> items) const;
+  Status choose_units(std::span<const SequenceItem> items, Program& program) const;
   void start(Program program);
+  [[nodiscard]] Int round() const;
   [[nodiscard]] std::size_t item_at(Int position) const;
-  [[nodiscard]] Outgoing outgoing_now(Int fade) const;
-  void advance(Int nanoseconds_32);
+  [[nodiscard]] std::size_t item_before(std::size_t item) const;
+  [[nodiscard]] Int repeat_at(const Scheduled& item, Int offset) const;
+  [[nodiscard]] Place place_in(std::size_t item, Int offset) const;
+  [[nodiscard]] bool goes_round(std::size_t item, Int repeat) const;
+  void blend_over(double cross_fade_s, const Program& to);
+  void advance(Int delta);
   void wrap();
-  [[nodiscard]] bool wraps_smoothly(const Scheduled& item, std::uint32_t repeat) const;
-  struct Place;
-  [[nodiscard]] FramePosition locate(const Place& place, std::size_t role);
+  [[nodiscard]] Moment look();
+  [[nodiscard]] FramePosition locate(const Place& place);
+  [[nodiscard]] std::optional<std::int64_t> next_change(const FramePosition& shown) const;
   [[nodiscard]] std::optional<FrameSpan> span_at(std::size_t clip, std::uint64_t tick) const;
   [[nodiscard]] std::optional<FrameSpan> span_of(std::size_t clip, std::uint64_t frame) const;
-  Status step_single(std::int64_t frames);
-  Result<bool> step_once(bool forwards);
+  Status step_in_clip(std::int64_t frames);
+  [[nodiscard]] Result<FrameSpan> span_in(std::size_t item, Int offset) const;
+  [[nodiscard]] Int position_of(const Scheduled& item, Int repeat, Int tick) const;
+  Result<bool> step_on();
+  Result<bool> step_back();
 
   std::vector<PlaybackClip> clips_;
   const FrameTimes* times_ = nullptr;
   Program program_;
-  Int position_ = 0;         ///< 0 <= position <= total
-  std::int64_t rounds_ = 0;  ///< times that the end was passed
+  Int position_ = 0;  ///< 0 <= position <= end
+  Int rounds_ = 0;    ///< times that the end was passed
   std::optional<Outgoing> outgoing_;
   std::optional<std::int64_t> last_ns_;
-  std::int64_t speed_32_ = std::int64_t{1} << 32;
+  std::int64_t speed_ = std::int64_t{1} << 32;  ///< times 2^32
   bool paused_ = false;
   LoopMode loop_mode_ = LoopMode::kAsGiven;
   std::vector<std::uint64_t> held_;  ///< by clip: the last frame that was known
