@@ -47,8 +47,10 @@ struct StageTimes {
   double decode_wait_s = 0;  ///< waiting for decoded frames
   double composite_s = 0;    ///< uploads and composite
   double draw_s = 0;
-  double total_s = 0;   ///< all of it
-  bool missed = false;  ///< its picture came too late whatever it cost: a frame was not decoded
+  double total_s = 0;  ///< all of it
+  /// Its picture came too late whatever it cost, because a frame was not decoded in time. Not where
+  /// the source stalled: giving up quality does not mend a network.
+  bool missed = false;
 };
 
 struct GovernorOptions {
