@@ -80,12 +80,7 @@ class LightField {
   LightFieldParts parts_;
 };
 
-/// Reads a .json light, of one light, of keys, of probes or of both (PLAYBACK.md has the forms).
-/// Messages name the place within the file: "keys[3].sh[1][2]". Errors: kCorrupt where it is not
-/// JSON, kInvalid, kLimit.
-Result<LightField> read_light_field(std::span<const std::uint8_t> json);
-
-/// The field as read_light_field() reads it: the same bytes for the same field, and the same
+/// The field as the .json that load_light() reads: the same bytes for the same field, and the same
 /// doubles when read again. A field of one light is what light_json() writes.
 [[nodiscard]] std::string light_field_json(const LightField& field);
 
