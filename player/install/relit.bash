@@ -2,9 +2,9 @@
 _relit() {
   local cur=${COMP_WORDS[COMP_CWORD]} prev=${COMP_WORDS[COMP_CWORD - 1]} program=${COMP_WORDS[0]}
   compopt -o filenames 2>/dev/null
-  _relit_files() { # SUFFIXES: folders, and files that end in one of them
-    local IFS=$'\n'
-    mapfile -t COMPREPLY < <(compgen -d -- "$cur"; compgen -f -X "!*.@($1)" -- "$cur")
+  _relit_files() { # SUFFIX...: folders, and files that end in one of them
+    local suffix
+    mapfile -t COMPREPLY < <(compgen -d -- "$cur"; for suffix; do compgen -f -X "!*.$suffix" -- "$cur"; done)
   }
   if ((COMP_CWORD == 1)); then
     compopt +o filenames 2>/dev/null
@@ -14,7 +14,7 @@ _relit() {
     return
   fi
   case $prev in
-    --light) _relit_files "hdr|exr|json"; return ;;
+    --light) _relit_files hdr exr json; return ;;
     -o | --output) mapfile -t COMPREPLY < <(compgen -f -- "$cur"); return ;;
     --backend) mapfile -t COMPREPLY < <(compgen -W "egl egl-es2 egl-es2-mediump osmesa cpu" -- "$cur"); return ;;
     --tone-map) mapfile -t COMPREPLY < <(compgen -W "neutral filmic linear" -- "$cur"); return ;;
@@ -29,9 +29,9 @@ _relit() {
     return
   fi
   case ${COMP_WORDS[1]} in
-    light) _relit_files "hdr|exr|json" ;;
-    import) _relit_files "relit|mkv" ;;
-    *) _relit_files "relit" ;;
+    light) _relit_files hdr exr json ;;
+    import) _relit_files relit mkv ;;
+    *) _relit_files relit ;;
   esac
 }
 complete -F _relit relit
