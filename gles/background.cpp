@@ -164,6 +164,7 @@ Result<BackgroundRenderer::SkyProgram*> BackgroundRenderer::sky_program(ToneMap 
 }
 
 Status BackgroundRenderer::draw(const View& view) {
+  if (kind_ == Background::Kind::kKeep) return {};
   const Functions& gl = device_->gl();
   // A clear is cut to the scissor, not to the viewport.
   gl.Enable(GL_SCISSOR_TEST);

@@ -196,6 +196,16 @@ Status CharacterRenderer::draw(const View& view, FusedLight& light) {
   return draw(view, Light{nullptr, &light});
 }
 
+Status CharacterRenderer::draw_background(const View& view) {
+  RELIT_TRY(device_.ready("drawing"));
+  if (!std::isfinite(view.exposure) || !(view.exposure >= 0) || view.width < 1 || view.height < 1)
+    return fail(ErrorCode::kInvalid, "the view's size or its exposure make no sense");
+  StateGuard guard(device_);
+  device_.gl().Viewport(view.x, view.y, view.width, view.height);
+  RELIT_TRY(background_.draw(view));
+  return device_.check("drawing");
+}
+
 Status CharacterRenderer::draw(const View& view, const Light& light) {
   RELIT_TRY(device_.ready("drawing"));
   if (!is_finite(view.view) || !is_finite(view.projection) ||

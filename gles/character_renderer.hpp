@@ -62,6 +62,8 @@ class CharacterRenderer {
   Status draw(const View& view, const LightMap& light_map);
   /// The same picture, with a light that is composited in the meshes' shader.
   Status draw(const View& view, FusedLight& light);
+  /// The background without meshes. Errors: as draw().
+  Status draw_background(const View& view);
 
   /// Buffers and textures, for the memory plan.
   [[nodiscard]] std::size_t gpu_bytes() const;
