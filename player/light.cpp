@@ -100,7 +100,7 @@ Status read_light(const std::string& path, const LightOptions& options, LoadedLi
       field.transform(options.order, options.rotate_rad, options.window);
       loaded.light = field.parts().lights[0];
       if (field.varies_in_time() || field.varies_in_space()) {
-        loaded.light = field.at(0, glm::vec3(0));
+        loaded.light = field.mean();
         loaded.field = std::move(field);
       }
       return {};

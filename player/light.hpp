@@ -20,7 +20,7 @@ struct LightOptions {
 };
 
 struct LoadedLight {
-  decoders::Light light;  ///< turned and windowed as asked; of a field at time 0 and the origin
+  decoders::Light light;  ///< turned and windowed as asked; of a field its mean, for the exposure
   std::optional<LightField> field;  ///< of a light that varies; turned and windowed likewise
   /// The picture as the file has it, for drawing the background; a direction's φ is
   /// φ(picture) + environment_rotation_rad. None for a .json.

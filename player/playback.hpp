@@ -198,6 +198,7 @@ class Playback {
 
   Playback() = default;
   [[nodiscard]] Program program_of(std::size_t clip) const;
+  void lay_out(std::size_t clip, Program& program) const;
   Result<Program> schedule(std::span<const SequenceItem> items) const;
   Status choose_units(std::span<const SequenceItem> items, Program& program) const;
   void start(Program program);

@@ -53,7 +53,7 @@ Status Playback::seek(double time_s) {
 void Playback::seek_tick(std::uint64_t tick) {
   const std::size_t clip = program_.items[item_at(position_)].clip;
   outgoing_.reset();
-  if (!program_.is_clip()) program_ = program_of(clip);
+  if (!program_.is_clip()) lay_out(clip, program_);
   rounds_ = 0;
   position_ =
       static_cast<Int>(std::min(tick, clips_[clip].duration_ticks - 1)) * program_.items[0].tick;

@@ -79,17 +79,23 @@ Result<Playback> Playback::create(std::span<const PlaybackClip> clips, const Fra
 }
 
 Playback::Program Playback::program_of(std::size_t clip) const {
+  Program program;
+  lay_out(clip, program);
+  return program;
+}
+
+// Makes a program of one clip; allocates nothing where it had items before.
+void Playback::lay_out(std::size_t clip, Program& program) const {
   const PlaybackClip& played = clips_[clip];
   Scheduled item;
   item.clip = clip;
   item.tick = kSecondUnits * played.tick_rate.den;
   item.length = item.tick * static_cast<Int>(played.duration_ticks);
-  Program program;
+  program.items.resize(1);
+  program.items[0] = item;
   program.scale = played.tick_rate.num;
   program.end = item.length;
   program.loop = played.loop;
-  program.items.push_back(item);
-  return program;
 }
 
 Status Playback::play_clip(std::size_t clip, double cross_fade_s) {

@@ -112,6 +112,14 @@ Status SceneView::turn_light(const LoadedLight& light, double turn_rad) {
   return {};
 }
 
+Status SceneView::vary_light(const decoders::Light& light) {
+  RELIT_TRY(fold(light));
+  if (options_.background != "light" && options_.background != "sh") return {};
+  LoadedLight seen;
+  seen.light = light;
+  return set_background(seen);
+}
+
 Status SceneView::set_background(const LoadedLight& light) {
   gles::Background background;
   std::vector<std::array<float, 3>> harmonics;

@@ -39,6 +39,9 @@ class SceneView {
   /// Takes only a turned light: `light` and its background are `turn_rad` further about +Y than
   /// set_light()'s.
   Status turn_light(const LoadedLight& light, double turn_rad);
+  /// Takes what the light that set_light() took has become at a time and place; it has no picture.
+  /// The exposure stays.
+  Status vary_light(const decoders::Light& light);
   /// Composites and poses a frame, which stays until the next one. Call it again after a change of
   /// light.
   Status set_frame(const ClipFrame& frame);

@@ -5,7 +5,9 @@
 #include <random>
 #include <string>
 
+#include "decoders/npy.hpp"
 #include "player/light_file.hpp"
+#include "tests/player/files.hpp"
 #include "tests/player/light_pictures.hpp"
 #include "tests/test.hpp"
 
@@ -331,11 +333,62 @@ TEST_CASE("load_light gives a field where the light varies, turned, windowed and
     decoders::window_light(expected);
     // Turning is linear: before or after blending differ by roundings of numbers below 8.
     check_same(loaded->field->at(time_s, {}), expected, 1e-14);
-    if (time_s == 0) check_same(loaded->light, expected, 1e-14);
   }
+  check_same(loaded->light, loaded->field->mean(), 0);
   const auto single = load_light(folder.write("one.json", *light_json(parts.lights[0])));
   REQUIRE(single);
   CHECK_FALSE(single->field);
+}
+
+namespace {
+
+/// The light map of frame 25 of the shipped clip, 0.5 s from its beginning.
+std::vector<float> light_map(const Folder& folder, const std::string& light,
+                             const std::string& more = "") {
+  const std::string out = (folder.path / "map.npy").string();
+  std::string says;
+  const int status =
+      test::run_relit("render " + test::shipped_clip().string() + " --light " + light +
+                          " --frame 25 --lightmap --backend cpu -o " + out + more,
+                      &says);
+  INFO(says);
+  REQUIRE(status == 0);
+  const auto array = decoders::read_npy(out);
+  REQUIRE(array);
+  return array->values;
+}
+
+}  // namespace
+
+TEST_CASE(
+    "relit light makes keys of several lights, and relit render follows clip time and place") {
+  const Folder folder;
+  std::mt19937 random(40);
+  const Light a = random_light(random, 9), b = random_light(random, 9);
+  const std::string first = folder.write("a.json", *light_json(a));
+  const std::string second = folder.write("b.json", *light_json(b));
+  const std::string keys = (folder.path / "keys.json").string();
+  REQUIRE(test::run_relit("light " + first + " " + second + " --times -0.5,1.5 --loop -o " +
+                          keys) == 0);
+  LightFieldParts parts;
+  parts.times_s = {-0.5, 1.5};
+  parts.loop = true;
+  parts.lights = {a, b};
+  const std::string half = folder.write("half.json", *light_json(make(parts).at(0.5, {})));
+  CHECK(light_map(folder, keys) == light_map(folder, half));
+  CHECK(light_map(folder, keys) != light_map(folder, first));
+
+  parts = {};
+  parts.grid = {{10, 0, 0}, {4, 1, 1}, {2, 1, 1}};
+  parts.lights = {a, b};
+  const std::string probes = folder.write("probes.json", light_field_json(make(parts)));
+  const std::string three = folder.write("three.json", *light_json(make(parts).at(0, {13, 0, 0})));
+  CHECK(light_map(folder, probes) == light_map(folder, first));  // at the origin: on the border
+  CHECK(light_map(folder, probes, " --at 13,-5,2") == light_map(folder, three));
+
+  CHECK(test::run_relit("light " + first + " " + second + " -o " + keys) == 2);
+  CHECK(test::run_relit("light " + first + " " + second + " --times 1,0 -o " + keys) == 2);
+  CHECK(test::run_relit("light " + keys + " " + second + " --times 0,1 -o " + keys) == 1);
 }
 
 }  // namespace relit::player
