@@ -14,13 +14,14 @@ struct DecoderMemory {
   std::uint64_t context_bytes = 0;
   /// The samples of one picture as the decoder allocates it, rows and columns padded.
   std::uint64_t picture_bytes = 0;
+  /// How many of them it holds at once, beside those that were taken from it.
+  std::uint64_t pictures = 0;
 };
 
 /// `pictures` is what the file says of the track (LayerRecord::mantissa_pictures); `threads` as
 /// VideoDecoder::open()'s, of which each beyond the first has a context and a picture of its own.
-/// An upper bound fitted to libavcodec 59 on 64-bit machines: sizes from 128x128 to 2048x1024, one
-/// and several threads, agree within 15 %; other codecs than VideoDecoder's take as much as the
-/// largest. Never fails.
+/// Upper bounds, fitted to measurements of libavcodec 59 on a 64-bit machine with one and two
+/// threads; h264's are within a tenth. Other codecs than VideoDecoder's count as hevc. Never fails.
 [[nodiscard]] DecoderMemory decoder_memory(const VideoFormat& format, int pictures, int threads);
 
 }  // namespace relit::decoders

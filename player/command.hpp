@@ -70,6 +70,7 @@ struct FrameRange {
 /// A subcommand: adds itself to the application; the function runs it after parsing.
 using Command = std::function<int()>;
 Command add_info(CLI::App& app);
+Command add_plan(CLI::App& app);
 Command add_dump(CLI::App& app);
 Command add_light(CLI::App& app);
 Command add_render(CLI::App& app);

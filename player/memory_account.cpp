@@ -146,6 +146,10 @@ std::string count_of(std::uint64_t count, const char* one, const char* many) {
 
 }  // namespace
 
+int threads_of_decoder(int threads, std::size_t layers) {
+  return std::max(1, threads / static_cast<int>(std::max<std::size_t>(layers, 1)));
+}
+
 Result<MemoryAccount> MemoryAccount::create(const FileContents& contents,
                                             const SegmentScale& segments,
                                             const MemoryWishes& wishes) {
@@ -159,7 +163,7 @@ Result<MemoryAccount> MemoryAccount::create(const FileContents& contents,
   }
   account.measure_layers();
   account.measure_poses();
-  if (account.drawn()) RELIT_TRY(account.measure_images());
+  if (account.drawn()) account.measure_images();
   return account;
 }
 
@@ -186,19 +190,16 @@ Status MemoryAccount::find_records(const FileContents& contents) {
 
 void MemoryAccount::measure_layers() {
   std::uint64_t plain_frame = 0;
-  const auto measure = [&](const decoders::VideoFormat& format, int pictures) {
-    const auto one = decoders::decoder_memory(format, pictures, 1);
-    const auto two = decoders::decoder_memory(format, pictures, 2);
-    plain_frame +=
-        decoders::picture_bytes(format.width, format.height, format.chroma, format.bit_depth);
-    return Track{one.context_bytes, two.context_bytes - one.context_bytes, one.picture_bytes,
-                 pictures};
-  };
   for (Layer& layer : layers_) {
     const LayerRecord& record = *layer.record;
-    layer.tracks.push_back(measure(decoders::mantissa_format(record), record.mantissa_pictures));
-    if (!record.has_exponents) continue;
-    layer.tracks.push_back(measure(decoders::exponent_format(record), record.exponent_pictures));
+    layer.tracks.push_back({decoders::mantissa_format(record), record.mantissa_pictures, true});
+    if (record.has_exponents) {
+      layer.tracks.push_back({decoders::exponent_format(record), record.exponent_pictures, false});
+    }
+    for (const Track& track : layer.tracks) {
+      const decoders::VideoFormat& f = track.format;
+      plain_frame += decoders::picture_bytes(f.width, f.height, f.chroma, f.bit_depth);
+    }
   }
   if (segments_.frames == 0) {
     const auto half_a_second =
@@ -233,7 +234,7 @@ void MemoryAccount::measure_poses() {
       skeleton.palette.size() * sizeof(glm::mat4x3) + pose_->channels.size() * sizeof(std::size_t);
 }
 
-Status MemoryAccount::measure_images() {
+void MemoryAccount::measure_images() {
   std::vector<std::uint64_t> texels;
   std::uint64_t working = 0;
   for (const container::ImageRecord& image : contents_->images) {
@@ -262,13 +263,14 @@ Status MemoryAccount::measure_images() {
       if (materials[i].linear_filter) images_gpu_bytes_ += 4 * texels[k] / 3;
     }
   }
-  return {};
 }
 
 std::uint64_t MemoryAccount::frame_bytes(std::size_t layers) const {
   std::uint64_t sum = pose_frame_bytes_;
   for (std::size_t l = 0; l < std::min(layers, layers_.size()); ++l) {
-    for (const Track& track : layers_[l].tracks) sum += track.picture_bytes;
+    for (const Track& track : layers_[l].tracks) {
+      sum += decoders::decoder_memory(track.format, track.pictures, 1).picture_bytes;
+    }
   }
   return sum;
 }
@@ -304,13 +306,14 @@ std::uint64_t MemoryAccount::segments_held(std::uint64_t ring_frames) const {
 
 void MemoryAccount::add_decoding(std::vector<MemoryTerm>& terms, const MemoryChoice& choice) const {
   std::uint64_t contexts = 0, references = 0, streams = 0;
-  const auto extra_threads = static_cast<std::uint64_t>(choice.threads - 1);
+  const int threads = threads_of_decoder(choice.threads, choice.layers);
   for (std::size_t l = 0; l < choice.layers; ++l) {
     for (const Track& track : layers_[l].tracks) {
+      const decoders::DecoderMemory memory =
+          decoders::decoder_memory(track.format, track.pictures, track.mantissas ? threads : 1);
       ++streams;
-      contexts += track.context_bytes + extra_threads * track.thread_bytes;
-      references += track.picture_bytes *
-                    (static_cast<std::uint64_t>(track.pictures) + extra_threads + kFramesAhead);
+      contexts += memory.context_bytes;
+      references += memory.picture_bytes * (memory.pictures + kFramesAhead);
     }
   }
   const std::uint64_t segments = segments_held(choice.ring_frames);

@@ -1,12 +1,17 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <string>
 #include <vector>
 
+#include "decoders/video_decoder.hpp"
 #include "player/memory_plan.hpp"
 
 /// The terms of a memory plan for one choice of what is negotiable.
 namespace relit::player {
+
+/// Frame threads of each mantissa decoder where `threads` workers share `layers` layers.
+[[nodiscard]] int threads_of_decoder(int threads, std::size_t layers);
 
 /// What a plan decides, in the order in which it is given up.
 struct MemoryChoice {
@@ -21,7 +26,7 @@ struct MemoryChoice {
 class MemoryAccount {
  public:
   /// Errors: kNotFound for a clip, a model or a pose track that is not there; those of
-  /// check_layer(), and of image_size() where images are to be drawn.
+  /// check_layer().
   static Result<MemoryAccount> create(const container::FileContents& contents,
                                       const SegmentScale& segments, const MemoryWishes& wishes);
 
@@ -31,6 +36,8 @@ class MemoryAccount {
 
   /// One decoded frame: the pictures of the first `layers` layers, and the pose.
   [[nodiscard]] std::uint64_t frame_bytes(std::size_t layers) const;
+  /// The largest segment's packets.
+  [[nodiscard]] std::uint64_t segment_bytes() const { return segments_.bytes; }
 
   /// All terms but those that are zero.
   [[nodiscard]] std::vector<MemoryTerm> terms(const MemoryChoice& choice) const;
@@ -38,10 +45,9 @@ class MemoryAccount {
  private:
   MemoryAccount() = default;
   struct Track {
-    std::uint64_t context_bytes = 0;  ///< with one thread
-    std::uint64_t thread_bytes = 0;   ///< for each further one
-    std::uint64_t picture_bytes = 0;
-    int pictures = 1;
+    decoders::VideoFormat format;
+    int pictures = 1;        ///< by the file
+    bool mantissas = false;  ///< the others are decoded on one thread
   };
   struct Layer {
     const container::LayerRecord* record = nullptr;
@@ -49,7 +55,7 @@ class MemoryAccount {
   };
 
   Status find_records(const container::FileContents& contents);
-  Status measure_images();
+  void measure_images();
   void measure_layers();
   void measure_poses();
 

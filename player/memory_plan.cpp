@@ -199,6 +199,13 @@ int MemoryPlan::layer_count() const {
   return static_cast<int>(std::count(layers.begin(), layers.end(), 1));
 }
 
+Result<std::uint64_t> smallest_budget(const container::FileContents& contents,
+                                      const SegmentScale& segments, const MemoryWishes& wishes) {
+  RELIT_ASSIGN(const MemoryAccount account, MemoryAccount::create(contents, segments, wishes));
+  RELIT_ASSIGN(const MemoryChoice wish, wished(account, wishes));
+  return total(account.terms(Search(account, wish, 0).least()));
+}
+
 Result<MemoryPlan> plan_memory(const container::FileContents& contents,
                                const SegmentScale& segments, const MemoryWishes& wishes,
                                std::optional<std::uint64_t> budget_bytes) {
@@ -208,11 +215,10 @@ Result<MemoryPlan> plan_memory(const container::FileContents& contents,
   const Search search(account, wish, budget);
   if (const MemoryChoice least = search.least(); !search.fits(least)) {
     const std::uint64_t needed = total(account.terms(least));
-    return fail(ErrorCode::kOutOfMemory, "a memory budget of " + std::to_string(budget) +
-                                             " bytes does not suffice: clip \"" +
-                                             account.clip().name + "\" needs " +
-                                             std::to_string(needed) + " (" + mebibytes(needed) +
-                                             ") with one layer, two frames ahead and one thread");
+    return fail(ErrorCode::kOutOfMemory,
+                "a memory budget of " + std::to_string(budget) +
+                    " bytes does not suffice: clip \"" + account.clip().name +
+                    "\" needs at least " + std::to_string(needed) + " (" + mebibytes(needed) + ")");
   }
   const MemoryChoice choice = search.best();
   MemoryPlan plan;
@@ -221,6 +227,8 @@ Result<MemoryPlan> plan_memory(const container::FileContents& contents,
   plan.frame_bytes = account.frame_bytes(choice.layers);
   plan.ring_bytes = plan.ring_frames * plan.frame_bytes;
   plan.threads = choice.threads;
+  plan.decoder_threads = threads_of_decoder(choice.threads, choice.layers);
+  plan.packet_bytes = account.segment_bytes();
   plan.layers.assign(account.layer_count(), 0);
   std::fill_n(plan.layers.begin(), choice.layers, std::uint8_t{1});
   plan.path = choice.path;
@@ -239,14 +247,25 @@ Result<SegmentScale> largest_segment(container::Reader& reader, const container:
     if (code == ErrorCode::kIo || code == ErrorCode::kCancelled) return Unexpected{index.error()};
     return scale;
   }
-  std::vector<std::uint64_t> starts{reader.offset_bytes()};
-  for (const auto& entry : index->segments) starts.push_back(entry.offset);
-  std::sort(starts.begin(), starts.end());
-  for (const auto& entry : index->segments) {
-    if (entry.clip_id != clip.id) continue;
-    scale.frames = std::max<std::uint64_t>(scale.frames, entry.frame_count);
-    const auto next = std::upper_bound(starts.begin(), starts.end(), entry.offset);
-    if (next != starts.end()) scale.bytes = std::max(scale.bytes, *next - entry.offset);
+  // A segment ends where the next one begins; only the last one has to say so itself.
+  std::vector<container::IndexRecord::Entry> entries = index->segments;
+  std::sort(entries.begin(), entries.end(),
+            [](const auto& a, const auto& b) { return a.offset < b.offset; });
+  for (std::size_t i = 0; i < entries.size(); ++i) {
+    if (entries[i].clip_id != clip.id) continue;
+    std::uint64_t bytes = 0;
+    if (i + 1 < entries.size()) {
+      bytes = entries[i + 1].offset - entries[i].offset;
+    } else {
+      RELIT_TRY(reader.seek_to_segment(entries[i]));
+      RELIT_ASSIGN(const auto record, reader.next());
+      if (!record) continue;
+      if (const auto* segment = std::get_if<container::SegmentRecord>(&record->body)) {
+        for (const auto& chunk : segment->chunks) bytes += chunk.chunk_bytes;
+      }
+    }
+    scale.frames = std::max<std::uint64_t>(scale.frames, entries[i].frame_count);
+    scale.bytes = std::max(scale.bytes, bytes);
   }
   return scale;
 }

@@ -20,14 +20,14 @@ struct SegmentScale {
   std::uint64_t bytes = 0;  ///< its record and all its chunks
 };
 
-/// From a file's index and where its segments end; nothing where there is no index. Reads the index
-/// and the end record, and leaves the reader where it stood. Errors: kIo, kCancelled.
+/// From a file's index, and the last segment's own record; zeros where the source cannot seek or
+/// has no index. The reader then stands inside that segment: it serves nothing else, or seeks.
+/// Errors: those of the source, and of a damaged last segment.
 [[nodiscard]] Result<SegmentScale> largest_segment(container::Reader& reader,
                                                    const container::ClipRecord& clip);
 
 /// The picture that the character is drawn into, and what is behind it.
 struct DrawingScale {
-  bool es3 = true;            ///< 10-bit planes and depths take the same either way
   int framebuffer_width = 0;  ///< 0: the host's own, which counts as nothing here
   int framebuffer_height = 0;
   int samples = 1;          ///< gles::FramebufferOptions::samples
@@ -74,7 +74,9 @@ struct MemoryPlan {
   std::uint64_t ring_frames = 0;
   std::uint64_t ring_bytes = 0;   ///< ring_frames decoded frames, their poses included
   std::uint64_t frame_bytes = 0;  ///< one of them
-  int threads = 1;
+  int threads = 1;                ///< decode workers
+  int decoder_threads = 1;  ///< frame threads of each mantissa decoder (PrefetchOptions::threads)
+  std::uint64_t packet_bytes = 0;    ///< coded chunks that may wait (PrefetchOptions::packet_bytes)
   std::vector<std::uint8_t> layers;  ///< by layer of the clip's model, 0: left out
   CompositePath path = CompositePath::kAuto;
   gles::LightMapFormat light_map = gles::LightMapFormat::kHalfFloat;
@@ -96,6 +98,11 @@ struct MemoryPlan {
                                              const SegmentScale& segments,
                                              const MemoryWishes& wishes,
                                              std::optional<std::uint64_t> budget_bytes);
+
+/// What the smallest plan takes: the least budget that is not refused. Errors: as plan_memory().
+[[nodiscard]] Result<std::uint64_t> smallest_budget(const container::FileContents& contents,
+                                                    const SegmentScale& segments,
+                                                    const MemoryWishes& wishes);
 
 /// "8388608", "8MiB", "8M", "64k", "1.5GiB": powers of 1024. Errors: kInvalid.
 [[nodiscard]] Result<std::uint64_t> parse_bytes(const std::string& text);
