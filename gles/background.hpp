@@ -44,8 +44,8 @@ class BackgroundRenderer {
   /// Turns the light about +Y: `angle_rad` is added to φ.
   void set_rotation(float angle_rad) { rotation_rad_ = angle_rad; }
 
-  /// Fills the view's rectangle of the bound framebuffer, depth included (to 1), or keeps it. Inside
-  /// a StateGuard.
+  /// Fills the view's rectangle of the bound framebuffer, depth included (to 1), or keeps it.
+  /// Inside a StateGuard.
   Status draw(const View& view);
 
  private:

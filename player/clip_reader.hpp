@@ -46,6 +46,7 @@ struct PlaybackLoss {
 struct ClipFrame {
   decoders::FrameView planes;
   decoders::Pose pose;
+  bool complete = true;
 };
 
 /// One clip of a file as a sequence of frames: reads segments as they are needed, decodes planes
