@@ -104,7 +104,7 @@ static relit_result draw_pictures(relit_player* player, const char* prefix, unsi
   add_lamp(light, sun, (const float[3]){5.0f, 4.1f, 2.9f});
   add_lamp(light, sky, (const float[3]){1.2f, 1.8f, 2.9f});
   for (int c = 0; c < 3; ++c) light[0][c] += 0.9f;  // and a little from everywhere
-  relit_clip_info clip = {sizeof clip};
+  relit_clip_info clip = {.struct_size = sizeof clip};
   relit_view view;
   relit_result result = relit_view_default(&view, sizeof view);
   if (!result) result = relit_set_light_sh(player, &light[0][0], 9);

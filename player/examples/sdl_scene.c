@@ -154,7 +154,7 @@ static relit_result load_character(Character* c) {
   c->meshes = calloc(c->mesh_count, sizeof *c->meshes);
   for (uint32_t i = 0; i < c->mesh_count && !result; ++i) {
     Mesh* mesh = &c->meshes[i];
-    relit_material_info material = {sizeof material, NULL, {1, 1, 1, 1}, -1, 0, 0, 0, 0, 0};
+    relit_material_info material = {.struct_size = sizeof material};
     mesh->info.struct_size = sizeof mesh->info;
     result = relit_mesh(c->player, i, &mesh->info);
     if (!result) result = relit_material(c->player, mesh->info.material, &material);
@@ -345,8 +345,8 @@ static relit_result draw(const Programs* programs, Character* c, const Scene* sc
   add_lamp(light, sky, (const float[3]){0.9f, 1.3f, 1.9f});
   for (int i = 0; i < 3; ++i) light[0][i] += 1.1f;
 
-  relit_moment moment = {sizeof moment};
-  relit_light_map map = {sizeof map};
+  relit_moment moment = {.struct_size = sizeof moment};
+  relit_light_map map = {.struct_size = sizeof map};
   float exposure = 1;
   relit_result result = relit_set_light_sh(c->player, &light[0][0], 9);
   if (!result) result = relit_update(c->player, (int64_t)(time_s * 1e9), &moment);
@@ -400,8 +400,8 @@ static relit_result play(relit_player* player, SDL_Window* window, long pictures
   relit_gl_options_default(&gl, sizeof gl);
   gl.get_proc_address = get_proc_address;
   relit_result result = relit_gl_attach(player, &gl);
-  Character character = {player, {sizeof(relit_clip_info)}, NULL, 0, NULL};
-  Scene scene = {{0}, 0, 0, 0, 0};
+  Character character = {.player = player};
+  Scene scene = {.count = 0};
   const Programs programs = {build(kCharacterVertex, kCharacterFragment, "a_uv", "a_albedo_uv"),
                              build(kSceneVertex, kSceneFragment, "a_normal", "a_color"),
                              build(kFootprintVertex, kFootprintFragment, "a_uv", "a_albedo_uv")};
