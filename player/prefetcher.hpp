@@ -11,7 +11,6 @@
 #include "container/base/result.hpp"
 #include "player/clip_demuxer.hpp"
 #include "player/clip_frame.hpp"
-#include "player/playback.hpp"
 #include "player/worker_pool.hpp"
 
 namespace relit::player {
@@ -117,8 +116,6 @@ class Prefetcher {
   /// what can be read of it; those of wait().
   Result<std::uint64_t> frame_at(std::uint64_t tick);
   /// When a frame that has come begins, and how many ticks it is shown.
-  std::optional<FrameSpan> span_at_tick(std::uint64_t tick) const;
-  std::optional<FrameSpan> span_of_frame(std::uint64_t frame) const;
   [[nodiscard]] std::uint64_t first_tick(std::uint64_t index) const;
   [[nodiscard]] std::uint32_t ticks_of(std::uint64_t index) const;
 
@@ -134,8 +131,9 @@ class Prefetcher {
   [[nodiscard]] PrefetchStats stats() const;
   [[nodiscard]] PlaybackLoss loss() const;
 
+  struct State;  ///< the implementation's
+
  private:
-  struct State;
   explicit Prefetcher(std::unique_ptr<State> state);
   std::unique_ptr<State> state_;
 };

@@ -3,6 +3,8 @@
 
 #include <memory>
 #include <mutex>
+#include <optional>
+#include <span>
 
 #include "container/base/result.hpp"
 #include "container/byte_source.hpp"
@@ -29,10 +31,13 @@ class SharedSource : public std::enable_shared_from_this<SharedSource> {
   explicit SharedSource(std::unique_ptr<container::ByteSource> source)
       : source_(std::move(source)) {}
 
+  Result<std::size_t> read_at(const Cursor& cursor, std::uint64_t position,
+                              std::span<std::uint8_t> out);
+
   std::mutex mutex_;
   std::unique_ptr<container::ByteSource> source_;
-  std::uint64_t position_ = 0;       ///< of source_
-  const Cursor* expects_ = nullptr;  ///< whose expect() the source heard last
+  std::optional<std::uint64_t> position_;  ///< of source_, where that is known
+  const Cursor* expects_ = nullptr;        ///< whose expect() the source heard last
 };
 
 }  // namespace relit::player
