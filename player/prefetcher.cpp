@@ -182,6 +182,16 @@ Result<std::uint64_t> Prefetcher::frame_at(std::uint64_t tick) {
   return s.start;
 }
 
+std::optional<FrameSpan> Prefetcher::span_at_tick(std::uint64_t tick) const {
+  const std::lock_guard lock(state_->mutex);
+  return player::span_at_tick(state_->timeline, tick);
+}
+
+std::optional<FrameSpan> Prefetcher::span_of_frame(std::uint64_t index) const {
+  const std::lock_guard lock(state_->mutex);
+  return player::span_of_frame(state_->timeline, index);
+}
+
 std::uint64_t Prefetcher::first_tick(std::uint64_t index) const {
   const std::lock_guard lock(state_->mutex);
   return state_->timeline.first_tick(index).value_or(index);

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "container/base/result.hpp"
 #include "player/clip_demuxer.hpp"
 #include "player/clip_frame.hpp"
+#include "player/playback.hpp"
 #include "player/worker_pool.hpp"
 
 namespace relit::player {
@@ -115,6 +117,9 @@ class Prefetcher {
   /// known yet, this goes there as want() does, and waits. Errors: kNotFound beyond the clip or
   /// what can be read of it; those of wait().
   Result<std::uint64_t> frame_at(std::uint64_t tick);
+  /// What is known by now of when frames are shown; nothing: not yet. Never blocks.
+  [[nodiscard]] std::optional<FrameSpan> span_at_tick(std::uint64_t tick) const;
+  [[nodiscard]] std::optional<FrameSpan> span_of_frame(std::uint64_t index) const;
   /// When a frame that has come begins, and how many ticks it is shown.
   [[nodiscard]] std::uint64_t first_tick(std::uint64_t index) const;
   [[nodiscard]] std::uint32_t ticks_of(std::uint64_t index) const;

@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { kWidth = 720, kHeight = 720 };
+enum { kSide = 720, kScale = 2, kDrawn = kSide * kScale };  // drawn larger, for smooth edges
 
 static void* get_proc_address(void* user, const char* name) {
   (void)user;
@@ -18,8 +18,7 @@ static void* get_proc_address(void* user, const char* name) {
 
 // A context without a window where Mesa can, on the default display elsewhere.
 static int open_context(void) {
-  static const EGLint kSamples[] = {4, 0};
-  static const EGLint kSurface[] = {EGL_WIDTH, kWidth, EGL_HEIGHT, kHeight, EGL_NONE};
+  static const EGLint kSurface[] = {EGL_WIDTH, kDrawn, EGL_HEIGHT, kDrawn, EGL_NONE};
   static const EGLint kVersion[] = {EGL_CONTEXT_CLIENT_VERSION, 2, EGL_NONE};
   const PFNEGLGETPLATFORMDISPLAYEXTPROC get_display =
       (PFNEGLGETPLATFORMDISPLAYEXTPROC)eglGetProcAddress("eglGetPlatformDisplayEXT");
@@ -28,19 +27,16 @@ static int open_context(void) {
     display = eglGetDisplay(EGL_DEFAULT_DISPLAY);
     if (!display || !eglInitialize(display, NULL, NULL)) return 0;
   }
-  for (int i = 0; i < 2; ++i) {
-    // clang-format off
-    const EGLint wanted[] = {EGL_SURFACE_TYPE, EGL_PBUFFER_BIT, EGL_RENDERABLE_TYPE, EGL_OPENGL_ES2_BIT,
-                             EGL_ALPHA_SIZE, 8, EGL_DEPTH_SIZE, 16, EGL_SAMPLES, kSamples[i], EGL_NONE};
-    // clang-format on
-    EGLConfig config;
-    EGLint count = 0;
-    if (!eglChooseConfig(display, wanted, &config, 1, &count) || count < 1) continue;
-    EGLSurface surface = eglCreatePbufferSurface(display, config, kSurface);
-    EGLContext context = eglCreateContext(display, config, EGL_NO_CONTEXT, kVersion);
-    if (surface && context && eglMakeCurrent(display, surface, surface, context)) return 1;
-  }
-  return 0;
+  // clang-format off
+  const EGLint wanted[] = {EGL_SURFACE_TYPE, EGL_PBUFFER_BIT, EGL_RENDERABLE_TYPE, EGL_OPENGL_ES2_BIT,
+                           EGL_ALPHA_SIZE, 8, EGL_DEPTH_SIZE, 16, EGL_NONE};
+  // clang-format on
+  EGLConfig config;
+  EGLint count = 0;
+  if (!eglChooseConfig(display, wanted, &config, 1, &count) || count < 1) return 0;
+  EGLSurface surface = eglCreatePbufferSurface(display, config, kSurface);
+  EGLContext context = eglCreateContext(display, config, EGL_NO_CONTEXT, kVersion);
+  return surface && context && eglMakeCurrent(display, surface, surface, context);
 }
 
 // Adds a lamp far away in `direction` (of unit length): radiance as spherical harmonics.
@@ -56,7 +52,7 @@ static void add_lamp(float light[9][3], const float d[3], const float color[3]) 
 
 // A camera in front of the middle of the box, a little to the right and above, that sees all of it.
 static void look_at(relit_view* view, const relit_clip_info* clip) {
-  const float azimuth = 0.45f, elevation = 0.14f, tangent = 0.26f;
+  const float azimuth = 0.45f, elevation = 0.16f, tangent = 0.26f;
   float middle[3], radius = 0;
   for (int i = 0; i < 3; ++i) {
     const float half = 0.5f * (clip->bounds_max[i] - clip->bounds_min[i]);
@@ -64,7 +60,7 @@ static void look_at(relit_view* view, const relit_clip_info* clip) {
     radius += half * half;
   }
   radius = sqrtf(radius);
-  const float distance = radius / tangent, near = distance - 1.2f * radius;
+  const float distance = 0.85f * radius / tangent, near = distance - 1.2f * radius;
   const float far = distance + 1.2f * radius;
   const float back[3] = {sinf(azimuth) * cosf(elevation), sinf(elevation),
                          cosf(azimuth) * cosf(elevation)};
@@ -92,18 +88,21 @@ static int write_ppm(const char* prefix, unsigned number, const uint8_t* rgba) {
   snprintf(name, sizeof name, "%s%03u.ppm", prefix, number);
   FILE* file = fopen(name, "wb");
   if (!file) return 0;
-  fprintf(file, "P6\n%d %d\n255\n", kWidth, kHeight);
-  for (int y = kHeight - 1; y >= 0; --y)
-    for (int x = 0; x < kWidth; ++x) fwrite(rgba + 4 * (y * kWidth + x), 1, 3, file);
+  fprintf(file, "P6\n%d %d\n255\n", kSide, kSide);
+  for (int i = 0; i < kSide * kSide; ++i) {
+    const uint8_t* p = rgba + 4 * kScale * ((kSide - 1 - i / kSide) * kDrawn + i % kSide);
+    for (int c = 0; c < 3; ++c)
+      fputc((p[c] + p[c + 4] + p[c + 4 * kDrawn] + p[c + 4 * kDrawn + 4] + 2) / 4, file);
+  }
   return fclose(file) == 0;
 }
 
 static relit_result draw_pictures(relit_player* player, const char* prefix, unsigned count) {
   float light[9][3] = {{0}};
-  const float sun[3] = {0.58f, 0.58f, 0.572f}, sky[3] = {-0.6f, 0.8f, 0};
-  add_lamp(light, sun, (const float[3]){5.0f, 4.1f, 2.9f});
-  add_lamp(light, sky, (const float[3]){1.2f, 1.8f, 2.9f});
-  for (int c = 0; c < 3; ++c) light[0][c] += 0.9f;  // and a little from everywhere
+  const float sun[3] = {0.86f, 0.40f, 0.31f}, sky[3] = {-0.6f, 0.8f, 0};
+  add_lamp(light, sun, (const float[3]){5.4f, 4.2f, 2.8f});
+  add_lamp(light, sky, (const float[3]){0.5f, 0.9f, 1.7f});
+  for (int c = 0; c < 3; ++c) light[0][c] += 0.35f;  // and a little from everywhere
   relit_clip_info clip = {.struct_size = sizeof clip};
   relit_view view;
   relit_result result = relit_view_default(&view, sizeof view);
@@ -112,16 +111,16 @@ static relit_result draw_pictures(relit_player* player, const char* prefix, unsi
   if (!result) result = relit_auto_exposure(player, &view.exposure);
   if (result) return result;
   look_at(&view, &clip);
-  view.width = kWidth, view.height = kHeight;
+  view.width = view.height = kDrawn;
   view.background = RELIT_BACKGROUND_COLOR;
   for (int c = 0; c < 3; ++c) view.background_color[c] = 0.14f + 0.03f * (float)c;
-  uint8_t* rgba = malloc(4 * kWidth * kHeight);
+  uint8_t* rgba = malloc(4 * kDrawn * kDrawn);
   for (unsigned i = 0; i < count && rgba && !result; ++i) {
     result = relit_seek(player, clip.duration_s * i / count);
     if (!result) result = relit_wait(player, 10, NULL);
     if (!result) result = relit_draw(player, &view);
     if (result) break;
-    glReadPixels(0, 0, kWidth, kHeight, GL_RGBA, GL_UNSIGNED_BYTE, rgba);
+    glReadPixels(0, 0, kDrawn, kDrawn, GL_RGBA, GL_UNSIGNED_BYTE, rgba);
     if (!write_ppm(prefix, i, rgba)) perror(prefix);
   }
   free(rgba);

@@ -18,7 +18,7 @@ static const float kSky[3] = {0.36f, 0.47f, 0.60f};  // linear
   "precision highp float;\n"                                          \
   "uniform float u_exposure; uniform vec3 u_sky; uniform vec3 u_eye;" \
   "vec4 display(vec3 radiance, float distance) {"                     \
-  "  vec3 c = 1.0 - exp(-1.6 * u_exposure * radiance);"               \
+  "  vec3 c = 1.0 - exp(-1.15 * u_exposure * radiance);"               \
   "  c = mix(c, u_sky, smoothstep(3.5, 14.0, distance));"             \
   "  return vec4(pow(c, vec3(1.0 / 2.2)), 1.0); }\n"
 
@@ -55,9 +55,9 @@ static const char* const kSceneFragment = TONE
     "  return max(e + 0.136569 * u_sh[8] * (n.x * n.x - n.y * n.y), 0.0); }"
     "float shade() {"  // what the character's shadow leaves
     "  vec2 at = v_position.xz / u_reach * 0.5 + 0.5; float sum = 0.0;"
-    "  for (int y = -3; y <= 3; ++y) for (int x = -3; x <= 3; ++x)"
-    "    sum += texture2D(u_footprint, at + vec2(float(x), float(y)) * 0.006).r;"
-    "  return 1.0 - 0.62 * sum / 49.0; }"
+    "  for (int y = -2; y <= 2; ++y) for (int x = -2; x <= 2; ++x)"
+    "    sum += texture2D(u_footprint, at + vec2(float(x), float(y)) * 0.008).r;"
+    "  return 1.0 - 0.62 * sum / 25.0; }"
     "void main() {"
     "  vec3 color = v_color; float lit = 1.0;"
     "  if (v_normal.y > 0.5 && v_position.y < u_floor + 0.001) {"
@@ -248,7 +248,7 @@ static void make_scene(Scene* scene, float floor) {
                                       {0.70f, 0.68f, 0.62f},
                                       {0.30f, 0.42f, 0.22f}};
   const float low[3] = {-20, floor - 0.2f, -20}, high[3] = {20, floor, 20};
-  const float stone[3] = {0.52f, 0.50f, 0.47f};
+  const float stone[3] = {0.36f, 0.33f, 0.30f};
   add_box(scene, low, high, stone);
   for (int i = 0; i < 5; ++i) {
     const float* b = kBoxes[i];
@@ -343,7 +343,7 @@ static relit_result draw(const Programs* programs, Character* c, const Scene* sc
   float light[9][3] = {{0}};
   add_lamp(light, sun, (const float[3]){4.6f, 3.9f, 2.9f});
   add_lamp(light, sky, (const float[3]){0.9f, 1.3f, 1.9f});
-  for (int i = 0; i < 3; ++i) light[0][i] += 1.1f;
+  for (int i = 0; i < 3; ++i) light[0][i] += 0.5f;
 
   relit_moment moment = {.struct_size = sizeof moment};
   relit_light_map map = {.struct_size = sizeof map};
@@ -429,13 +429,19 @@ int main(int argc, char** argv) {
   if (SDL_Init(SDL_INIT_VIDEO)) return fprintf(stderr, "%s\n", SDL_GetError()), 2;
   SDL_GL_SetAttribute(SDL_GL_CONTEXT_PROFILE_MASK, SDL_GL_CONTEXT_PROFILE_ES);
   SDL_GL_SetAttribute(SDL_GL_CONTEXT_MAJOR_VERSION, 2);
+  SDL_GL_SetAttribute(SDL_GL_CONTEXT_MINOR_VERSION, 0);
   SDL_GL_SetAttribute(SDL_GL_DEPTH_SIZE, 24);
-  SDL_GL_SetAttribute(SDL_GL_MULTISAMPLEBUFFERS, 1);
-  SDL_GL_SetAttribute(SDL_GL_MULTISAMPLESAMPLES, 4);
-  SDL_Window* window =
-      SDL_CreateWindow("relit in a scene", SDL_WINDOWPOS_CENTERED, SDL_WINDOWPOS_CENTERED, 960, 640,
-                       SDL_WINDOW_OPENGL | SDL_WINDOW_RESIZABLE | SDL_WINDOW_ALLOW_HIGHDPI);
-  SDL_GLContext context = window ? SDL_GL_CreateContext(window) : NULL;
+  SDL_Window* window = NULL;
+  SDL_GLContext context = NULL;
+  for (int samples = 4; !context && samples >= 0; samples -= 4) {  // not every driver has many
+    SDL_GL_SetAttribute(SDL_GL_MULTISAMPLEBUFFERS, samples > 0);
+    SDL_GL_SetAttribute(SDL_GL_MULTISAMPLESAMPLES, samples);
+    if (window) SDL_DestroyWindow(window);
+    window =
+        SDL_CreateWindow("relit in a scene", SDL_WINDOWPOS_CENTERED, SDL_WINDOWPOS_CENTERED, 960,
+                         640, SDL_WINDOW_OPENGL | SDL_WINDOW_RESIZABLE | SDL_WINDOW_ALLOW_HIGHDPI);
+    if (window) context = SDL_GL_CreateContext(window);
+  }
   if (!context) return fprintf(stderr, "%s\n", SDL_GetError()), 2;
   SDL_GL_SetSwapInterval(1);
   relit_player* player = NULL;
