@@ -30,6 +30,20 @@ void PictureMemory::add(std::size_t bytes) {
   }
 }
 
+std::uint8_t* PictureMemory::allocate(std::size_t bytes) const {
+  if (allocator_.allocate != nullptr)
+    return static_cast<std::uint8_t*>(allocator_.allocate(allocator_.user, bytes, kAlignment));
+  return static_cast<std::uint8_t*>(
+      ::operator new (bytes, std::align_val_t{kAlignment}, std::nothrow));
+}
+
+void PictureMemory::release(std::uint8_t* memory, std::size_t bytes) const {
+  if (allocator_.release != nullptr)
+    allocator_.release(allocator_.user, memory, bytes);
+  else
+    ::operator delete (memory, std::align_val_t{kAlignment});
+}
+
 PictureLayout picture_layout(AVCodecContext& context, int width, int height) {
   const auto pixel = context.pix_fmt;
   const AVPixFmtDescriptor* format = av_pix_fmt_desc_get(pixel);
@@ -65,7 +79,7 @@ PicturePool::~PicturePool() {
 void PicturePool::destroy(Block* block) {
   own_.remove(block->bytes);
   if (shared_) shared_->remove(block->bytes);
-  ::operator delete (block->data, std::align_val_t{kAlignment});
+  source().release(block->data, block->bytes);
   delete block;
 }
 
@@ -88,12 +102,11 @@ PicturePool::Block* PicturePool::take(std::size_t bytes) {
       return block;
     }
   }
-  auto* data = static_cast<std::uint8_t*>(
-      ::operator new (bytes, std::align_val_t{kAlignment}, std::nothrow));
+  std::uint8_t* data = source().allocate(bytes);
   if (data == nullptr) return nullptr;
   auto* block = new (std::nothrow) Block;
   if (block == nullptr) {
-    ::operator delete (data, std::align_val_t{kAlignment});
+    source().release(data, bytes);
     return nullptr;
   }
   // What a damaged picture leaves out is not what was in memory before.

@@ -14,15 +14,32 @@ struct AVFrame;
 /// Where libavcodec's pictures live, so that what a decoder holds is known (design, section 5).
 namespace relit::decoders {
 
-/// Counts the bytes of pictures' buffers, of one decoder or of several. Any thread.
+/// Where the memory of pictures comes from. Called from any thread.
+struct PictureAllocator {
+  void* user = nullptr;
+  /// Null: out of memory. `alignment` is a power of two.
+  void* (*allocate)(void* user, std::size_t bytes, std::size_t alignment) = nullptr;
+  void (*release)(void* user, void* memory, std::size_t bytes) = nullptr;
+};
+
+/// Counts the bytes of pictures' buffers, of one decoder or of several, and gets them. Any thread.
 class PictureMemory {
  public:
+  PictureMemory() = default;
+  /// Both functions are set, and can be called as long as a picture is left.
+  explicit PictureMemory(const PictureAllocator& allocator) : allocator_(allocator) {}
+
+  /// Null: out of memory. Aligned as libavcodec's code asks.
+  [[nodiscard]] std::uint8_t* allocate(std::size_t bytes) const;
+  void release(std::uint8_t* memory, std::size_t bytes) const;
+
   void add(std::size_t bytes);
   void remove(std::size_t bytes) { bytes_.fetch_sub(bytes, std::memory_order_relaxed); }
   [[nodiscard]] std::size_t bytes() const { return bytes_.load(std::memory_order_relaxed); }
   [[nodiscard]] std::size_t peak_bytes() const { return peak_.load(std::memory_order_relaxed); }
 
  private:
+  PictureAllocator allocator_;
   std::atomic<std::size_t> bytes_{0};
   std::atomic<std::size_t> peak_{0};
 };
@@ -43,7 +60,7 @@ struct PictureLayout {
 /// alive, so that pictures outlive the decoder. Any thread.
 class PicturePool : public std::enable_shared_from_this<PicturePool> {
  public:
-  /// Also counts in `memory`, where that is not null.
+  /// Also counts in `memory`, and gets its own from there, where that is not null.
   explicit PicturePool(std::shared_ptr<PictureMemory> memory) : shared_(std::move(memory)) {}
   ~PicturePool();
   PicturePool(const PicturePool&) = delete;
@@ -67,6 +84,7 @@ class PicturePool : public std::enable_shared_from_this<PicturePool> {
   static void give_back(void* block, std::uint8_t* data);
   [[nodiscard]] Block* take(std::size_t bytes);
   void destroy(Block* block);
+  [[nodiscard]] const PictureMemory& source() const { return shared_ ? *shared_ : own_; }
 
   mutable std::mutex mutex_;
   std::vector<Block*> free_;

@@ -75,6 +75,9 @@ PlayerOptions player_options(const relit_open_options& options, relit_player& ha
   if (options.decoder != nullptr) out.decoder = options.decoder;
   if (options.pool != nullptr) out.pool = options.pool->pool;
   out.interrupt = handle.interrupt;
+  if (options.allocator != nullptr)
+    out.pictures = std::make_shared<decoders::PictureMemory>(decoders::PictureAllocator{
+        options.allocator->user, options.allocator->allocate, options.allocator->release});
   if (handle.log.function != nullptr) {
     out.log = [&handle](LogLevel level, const std::string& text) {
       handle.log.say(static_cast<relit_log_level>(level), text);

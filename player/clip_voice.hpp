@@ -55,7 +55,7 @@ class ClipVoice {
 
   [[nodiscard]] std::size_t clip() const { return clip_; }
   [[nodiscard]] Prefetcher& prefetcher() { return *prefetcher_; }
-  [[nodiscard]] Relighter* relighter() { return relighter_.get(); }
+  [[nodiscard]] Relighter* relighter() const { return relighter_.get(); }
 
  private:
   ClipVoice() = default;

@@ -12,6 +12,11 @@ namespace relit::player {
 Player::Player(std::unique_ptr<State> state) : state_(std::move(state)) {}
 Player::~Player() = default;
 
+// Whatever is being read stops first, so that voices need not wait for it.
+Player::State::~State() {
+  if (options.interrupt) options.interrupt->raise();
+}
+
 Result<std::unique_ptr<Player>> Player::open(std::unique_ptr<container::ByteSource> source,
                                              const PlayerOptions& options) {
   return catch_out_of_memory("opening a player", [&]() -> Result<std::unique_ptr<Player>> {
@@ -46,15 +51,15 @@ std::vector<std::uint8_t> Player::State::allowed_layers(std::size_t count) const
   return allowed;
 }
 
-PrefetchOptions Player::State::prefetch_options(std::span<const container::LayerRecord> records,
-                                                bool first) const {
+PrefetchOptions Player::State::prefetch_options(std::size_t layer_count, bool round) const {
   PrefetchOptions prefetch;
   prefetch.ring_bytes = static_cast<std::size_t>(plan.ring_bytes);
   if (plan.packet_bytes > 0) prefetch.packet_bytes = static_cast<std::size_t>(plan.packet_bytes);
   prefetch.threads = plan.decoder_threads;
-  prefetch.layers = allowed_layers(records.size());
+  prefetch.layers = allowed_layers(layer_count);
   prefetch.decoder = options.decoder;
-  prefetch.impatient = first;
+  prefetch.memory = options.pictures;
+  prefetch.loop = round;
   return prefetch;
 }
 
@@ -87,10 +92,11 @@ Status Player::State::plan_and_start(ClipDemuxer demuxer) {
   RELIT_TRY(playback->play_clip(wanted));
   posed.emplace(statics->meshes);
 
-  const PrefetchOptions prefetch = prefetch_options(demuxer.layers(), true);
+  // What only goes forward does not come round.
+  if (!shared) playback->set_loop(LoopMode::kOff);
+  const PrefetchOptions prefetch = prefetch_options(demuxer.layers().size(), playback->loops());
   RELIT_ASSIGN(primary, ClipVoice::create(wanted, std::move(demuxer), pool, prefetch));
   primary_item = {program, std::size_t{0}};
-  RELIT_TRY(set_loops());
   RELIT_TRY(attach_voice(*primary));
   moment.clip = wanted;
   counted.open_ms = 1e3 * seconds_since(opened);
@@ -201,6 +207,7 @@ Status Player::set_path(CompositePath path) {
   state_->options.path = path;
   for (ClipVoice* voice : state_->voices())
     if (voice != nullptr && state_->device) RELIT_TRY(voice->relighter()->set_path(path));
+  state_->recomposite = true;
   return {};
 }
 
@@ -216,6 +223,9 @@ Result<bool> Player::wait(double timeout_s) { return state_->wait(timeout_s); }
 void Player::cancel() {
   state_->cancelled.store(true);
   if (state_->options.interrupt) state_->options.interrupt->raise();
+  const std::lock_guard lock(state_->roles);
+  for (ClipVoice* voice : state_->voices())
+    if (voice != nullptr) voice->prefetcher().cancel();
 }
 
 }  // namespace relit::player

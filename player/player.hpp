@@ -13,6 +13,7 @@
 #include "container/byte_source.hpp"
 #include "container/reader.hpp"
 #include "decoders/mesh.hpp"
+#include "decoders/picture_pool.hpp"
 #include "decoders/sh.hpp"
 #include "gles/device.hpp"
 #include "gles/light_map.hpp"
@@ -44,6 +45,8 @@ struct PlayerOptions {
   bool sparing = false;              ///< not everything will be played: fetch only what is needed
   std::shared_ptr<WorkerPool> pool;  ///< null: one of its own
   std::shared_ptr<Interrupt> interrupt;  ///< what the source polls; null: it cannot be stopped
+  /// Where the pictures of decoders are; null: in the runtime's memory.
+  std::shared_ptr<decoders::PictureMemory> pictures;
   /// Takes a sentence for the user. Called from the threads that call the player.
   std::function<void(LogLevel, const std::string&)> log;
 };

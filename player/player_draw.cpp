@@ -37,6 +37,7 @@ Status Player::State::attach(std::unique_ptr<gles::Device> context) {
     for (const std::string& warning : character->warnings()) say(LogLevel::kWarning, warning);
     for (ClipVoice* voice : voices())
       if (voice != nullptr) RELIT_TRY(attach_voice(*voice));
+    lit = nullptr;
     return {};
   };
   const Status built = build();
@@ -55,6 +56,7 @@ void Player::State::forget_gl() {
   positions_uploaded = false;
   exposure = 0;
   draws = 0;
+  lit = nullptr;
   composited_at = 0;
   for (ClipVoice* voice : voices()) {
     if (voice == nullptr) continue;
@@ -113,15 +115,17 @@ Status Player::State::set_backdrop(const Backdrop& wanted) {
 }
 
 // Planes that this exposure cannot show are left out, and those that it does are brought back.
-Status Player::State::use_exposure(float wanted) {
-  if (wanted == exposure) return {};
+void Player::State::use_exposure(float wanted) {
+  if (wanted == exposure) return;
   exposure = wanted;
-  for (ClipVoice* voice : voices()) {
-    if (voice == nullptr) continue;
-    voice->relighter()->set_exposure(exposure);
-    RELIT_TRY(voice->fetch_needed(false));
-  }
-  return moment.ready ? composite() : Status();
+  recomposite = true;
+  for (ClipVoice* voice : voices())
+    if (voice != nullptr) voice->relighter()->set_exposure(exposure);
+}
+
+// What has changed since the last update, other than time, shows now.
+Status Player::State::freshen() {
+  return light_stale || recomposite ? show(playback->now(), true) : Status();
 }
 
 Status Player::draw(const gles::View& view, const Backdrop& backdrop) {
@@ -136,13 +140,15 @@ Status Player::State::draw(const gles::View& view, const Backdrop& wanted) {
   RELIT_TRY(set_backdrop(wanted));
   gles::CharacterRenderer& renderer = character->renderer();
   if (!moment.ready) return renderer.draw_background(view);
-  RELIT_TRY(use_exposure(std::isfinite(view.exposure) && view.exposure > 0 ? view.exposure : 0));
+  use_exposure(std::isfinite(view.exposure) && view.exposure > 0 ? view.exposure : 0);
+  RELIT_TRY(freshen());
+  if (lit == nullptr) return renderer.draw_background(view);
   if (!positions_uploaded) {
     for (std::size_t m = 0; m < posed->count(); ++m)
       RELIT_TRY(renderer.update_positions(m, posed->positions(m)));
     positions_uploaded = true;
   }
-  RELIT_TRY(primary->relighter()->draw(renderer, view));
+  RELIT_TRY(lit->relighter()->draw(renderer, view));
   const double took_s = seconds_since(begin);
   if (draws++ == 0) counted.first_draw_ms = 1e3 * took_s;
   draw_s.add(took_s);
@@ -152,7 +158,8 @@ Status Player::State::draw(const gles::View& view, const Backdrop& wanted) {
 
 // The one path that is cheapest for what is seen. Not during a fade, which comes and goes.
 Status Player::State::measure_paths(const gles::View& view) {
-  if (draws < kFirstMeasuring || secondary || primary_frames.from == nullptr || moment.late)
+  if (draws < kFirstMeasuring || secondary || lit != primary.get() ||
+      primary_frames.from == nullptr || moment.late)
     return {};
   Relighter& relighter = *primary->relighter();
   if (!relighter.wants_measuring(covered_pixels(view))) return {};
@@ -184,19 +191,24 @@ Result<gles::LightMap> Player::light_map() {
   if (!state_->device) return no_context();
   if (!state_->moment.ready) return no_picture();
   RELIT_TRY(state_->device->ready("light map"));
-  RELIT_TRY(state_->use_exposure(0));
-  return state_->primary->relighter()->texture();
+  state_->use_exposure(0);
+  RELIT_TRY(state_->freshen());
+  if (state_->lit == nullptr) return no_picture();
+  return state_->lit->relighter()->texture();
 }
 
 Status Player::read_light_map(std::span<float> out) {
   if (!state_->moment.ready) return no_picture();
   if (state_->device) RELIT_TRY(state_->device->ready("light map"));
-  RELIT_TRY(state_->use_exposure(0));
-  return state_->primary->relighter()->read(out);
+  state_->use_exposure(0);
+  RELIT_TRY(state_->freshen());
+  if (state_->lit == nullptr) return no_picture();
+  return state_->lit->relighter()->read(out);
 }
 
 Player::Size Player::light_map_size() const {
-  const Relighter& relighter = *state_->primary->relighter();
+  const ClipVoice& voice = state_->lit != nullptr ? *state_->lit : *state_->primary;
+  const Relighter& relighter = *voice.relighter();
   return {relighter.width(), relighter.height()};
 }
 

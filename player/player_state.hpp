@@ -4,6 +4,7 @@
 #include <array>
 #include <atomic>
 #include <chrono>
+#include <mutex>
 
 #include "player/character.hpp"
 #include "player/clip_voice.hpp"
@@ -30,6 +31,7 @@ class RecentMean {
 };
 
 struct Player::State final : FrameTimes {
+  ~State() override;
   using Clock = std::chrono::steady_clock;
   [[nodiscard]] static double seconds_since(Clock::time_point start) {
     return std::chrono::duration<double>(Clock::now() - start).count();
@@ -38,8 +40,7 @@ struct Player::State final : FrameTimes {
   // player.cpp
   Status open(std::unique_ptr<container::ByteSource> source);
   Status plan_and_start(ClipDemuxer demuxer);
-  [[nodiscard]] PrefetchOptions prefetch_options(std::span<const container::LayerRecord> layers,
-                                                 bool first) const;
+  [[nodiscard]] PrefetchOptions prefetch_options(std::size_t layer_count, bool round) const;
   [[nodiscard]] std::vector<std::uint8_t> allowed_layers(std::size_t count) const;
   [[nodiscard]] std::optional<FrameSpan> at_tick(std::size_t clip,
                                                  std::uint64_t tick) const override;
@@ -52,12 +53,15 @@ struct Player::State final : FrameTimes {
 
   // player_voices.cpp
   Status assign_voices(const Moment& now);
-  Result<std::unique_ptr<ClipVoice>> make_voice(std::size_t clip);
+  Status change_item(const Moment& now);
+  void drop(std::unique_ptr<ClipVoice>& voice);
+  [[nodiscard]] bool goes_round(std::size_t item) const;
+  Result<std::unique_ptr<ClipVoice>> make_voice(std::size_t clip, bool round);
   Status attach_voice(ClipVoice& voice);
   Status prepare_next(const Moment& now);
   Status set_loops();
-  [[nodiscard]] std::array<ClipVoice*, 3> voices() const {
-    return {primary.get(), secondary.get(), prepared.get()};
+  [[nodiscard]] std::array<ClipVoice*, 4> voices() const {
+    return {primary.get(), secondary.get(), prepared.get(), leaving.get()};
   }
 
   // player_update.cpp
@@ -70,13 +74,15 @@ struct Player::State final : FrameTimes {
   void note_shown(const Moment& now);
   [[nodiscard]] bool stands(std::int64_t now_ns);
   Result<bool> wait(double timeout_s);
+  Result<bool> wait_for(ClipVoice& voice, const FramePosition& position, double timeout_s);
   Status source_error();
 
   // player_draw.cpp
   Status attach(std::unique_ptr<gles::Device> context);
   void forget_gl();
   Status set_backdrop(const Backdrop& wanted);
-  Status use_exposure(float exposure);
+  void use_exposure(float exposure);
+  Status freshen();
   Status draw(const gles::View& view, const Backdrop& wanted);
   Status measure_paths(const gles::View& view);
   [[nodiscard]] double covered_pixels(const gles::View& view) const;
@@ -97,9 +103,12 @@ struct Player::State final : FrameTimes {
   bool sequence_loops = false;
   unsigned program = 0;  ///< counts what was begun to be played
 
-  // Voices by role, and whose the primary is.
+  // Voices by role, and whose the primary is. The mutex is for cancel(), which comes from anywhere.
+  std::mutex roles;
   std::unique_ptr<ClipVoice> primary, secondary;
-  std::unique_ptr<ClipVoice> prepared;                           ///< of the item that comes next
+  std::unique_ptr<ClipVoice> prepared;  ///< of the item that comes next
+  std::unique_ptr<ClipVoice> leaving;   ///< shown until the primary has its first frame
+  ClipVoice* lit = nullptr;             ///< whose light map is shown: one of these; null: none yet
   std::optional<std::pair<unsigned, std::size_t>> primary_item;  ///< program, item
   ClipVoice::Frames primary_frames, secondary_frames;
   float secondary_weight = 0;
@@ -118,6 +127,8 @@ struct Player::State final : FrameTimes {
   std::optional<std::int64_t> last_ns, late_since_ns;
   double light_time_s = 0;
   bool light_stale = true;          ///< a relighter has not got the light yet
+  bool recomposite = false;         ///< something else than frame and light has changed
+  bool shown_complete = false;      ///< all planes of the frame that is shown were here
   std::uint64_t composited_at = 0;  ///< the update that composited last
   std::string reported_error;
   bool seeking = true;  ///< frames passed over were not due

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <cmath>
+#include <thread>
 
 #include "container/base/out_of_memory.hpp"
 #include "player/player_state.hpp"
@@ -33,7 +34,12 @@ Status Player::State::update(std::int64_t now_ns) {
     light_time_s += 1e-9 * static_cast<double>(now_ns - *last_ns) * playback->speed();
   last_ns = now_ns;
   if (stand) playback->skip_to(now_ns);
-  const Moment now = stand ? playback->now() : playback->at(now_ns);
+  Moment now = stand ? playback->now() : playback->at(now_ns);
+  // After a seek into frames of unequal length somebody has to look where they are.
+  if (seeking && !now.primary.known && primary && primary->clip() == now.primary.clip) {
+    RELIT_TRY(primary->prefetcher().frame_at(now.primary.tick));
+    now = playback->now();
+  }
   const Status shown =
       catch_out_of_memory("showing a frame", [&] { return show(now, seeking || !moment.ready); });
   update_s += seconds_since(begin);
@@ -66,6 +72,9 @@ void Player::State::govern(std::int64_t now_ns) {
 
 Status Player::State::show(const Moment& now, bool at_once) {
   RELIT_TRY(assign_voices(now));
+  // Before frames are taken: another light may need layers that are fetched anew.
+  bool anew = recomposite;
+  RELIT_TRY(bring_light(anew));
   const Quality quality = governor->quality();
   const bool blend = options.interpolate && quality.frames_every == 1;
   FramePosition position = now.primary;
@@ -86,18 +95,21 @@ Status Player::State::show(const Moment& now, bool at_once) {
     return {};
   }
   moment.late = primary_frames.late;
-  bool light_changed = false, posed_anew = false;
-  RELIT_TRY(bring_light(light_changed));
+  bool posed_anew = false;
   RELIT_TRY(pose_meshes(now, posed_anew));
+  // The early first picture is completed in place.
+  anew |= !shown_complete && primary_frames.from->complete;
+  shown_complete = primary_frames.from->complete;
   const bool first = !moment.ready;
   const auto every = static_cast<std::uint64_t>(quality.light_map_every);
   const bool due = counted.updates - composited_at >= every;
   bool composited = false;
-  if (first || light_changed || at_once || (posed_anew && due)) {
+  if (first || anew || at_once || (posed_anew && due)) {
     const std::uint64_t before = primary->relighter()->stats().composites;
     RELIT_TRY(composite());
     composited = primary->relighter()->stats().composites != before;
     composited_at = counted.updates;
+    recomposite = false;
   }
   moment.changed = first || posed_anew || composited;
   note_shown(now);
@@ -119,13 +131,15 @@ void Player::State::note_shown(const Moment& now) {
 // Folds the light of the moment into what is shown.
 Status Player::State::bring_light(bool& changed) {
   const bool moved = light->sample(light_time_s);
-  changed = moved || light_stale;
+  const bool fold = moved || light_stale;
+  changed |= fold;
   if (moved) backdrop_stale = true;
   const Quality quality = governor->quality();
   for (ClipVoice* voice : voices()) {
     if (voice == nullptr) continue;
     Relighter& relighter = *voice->relighter();
-    if (changed) RELIT_TRY(voice->set_light(light->now(), light->varies()));
+    if (fold) RELIT_TRY(voice->set_light(light->now(), light->varies()));
+    if (!fold && recomposite) RELIT_TRY(voice->fetch_needed(false));
     std::size_t planes = 0;
     for (const container::LayerRecord& layer : voice->prefetcher().layers())
       planes += layer.planes.size();
@@ -153,7 +167,7 @@ Status Player::State::pose_meshes(const Moment& now, bool& changed) {
     wanted.other_blend = secondary_frames.blend;
     wanted.other_weight = secondary_weight;
   }
-  if (wanted == shown_pose && !posed->empty() && primary_frames.from->complete) return {};
+  if (wanted == shown_pose && !posed->empty()) return {};
   const Clock::time_point begin = Clock::now();
   const decoders::Pose& pose = primary->pose(primary_frames);
   posed->set(pose, wanted.other != nullptr ? &secondary->pose(secondary_frames) : nullptr,
@@ -172,6 +186,11 @@ Status Player::State::composite() {
     RELIT_TRY(secondary->relighter()->composite(secondary_frames.mix()));
     RELIT_TRY(primary->relighter()->fade(*secondary->relighter(), secondary_weight));
   }
+  lit = primary.get();
+  if (leaving) {
+    const std::lock_guard lock(roles);
+    drop(leaving);
+  }
   const double took_s = seconds_since(begin);
   composite_s.add(took_s);
   composited_s += took_s;
@@ -187,9 +206,28 @@ Status Player::State::source_error() {
   return error;
 }
 
-Result<bool> Player::State::wait(double timeout_s) {
+// Until all planes of a position are here, the early first picture's too.
+Result<bool> Player::State::wait_for(ClipVoice& voice, const FramePosition& position,
+                                     double timeout_s) {
   const Clock::time_point begin = Clock::now();
   const auto left = [&] { return std::max(0.0, timeout_s - seconds_since(begin)); };
+  Prefetcher& prefetcher = voice.prefetcher();
+  prefetcher.want(position.frame);
+  for (;;) {
+    RELIT_ASSIGN(const bool here, prefetcher.wait(position.frame, left()));
+    if (!here) return false;
+    const ClipFrame* frame = prefetcher.frame(position.frame);
+    if (frame != nullptr && frame->complete) break;
+    if (left() <= 0) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  const bool blend = options.interpolate && position.fraction > 0;
+  if (!blend || position.next_frame == position.frame) return true;
+  return prefetcher.wait(position.next_frame, left());
+}
+
+Result<bool> Player::State::wait(double timeout_s) {
+  const Clock::time_point begin = Clock::now();
   if (cancelled.load()) return fail(ErrorCode::kCancelled, options.name + ": cancelled");
   Moment now = playback->now();
   RELIT_TRY(assign_voices(now));
@@ -197,18 +235,10 @@ Result<bool> Player::State::wait(double timeout_s) {
     RELIT_TRY(primary->prefetcher().frame_at(now.primary.tick));
     now = playback->now();
   }
-  const auto wait_for = [&](ClipVoice& voice, const FramePosition& position) -> Result<bool> {
-    voice.prefetcher().want(position.frame);
-    RELIT_ASSIGN(bool here, voice.prefetcher().wait(position.frame, left()));
-    if (here && options.interpolate && position.fraction > 0 &&
-        position.next_frame != position.frame) {
-      RELIT_ASSIGN(here, voice.prefetcher().wait(position.next_frame, left()));
-    }
-    return here;
-  };
-  RELIT_ASSIGN(bool here, wait_for(*primary, now.primary));
+  RELIT_ASSIGN(bool here, wait_for(*primary, now.primary, timeout_s));
   if (here && now.secondary) {
-    RELIT_ASSIGN(here, wait_for(*secondary, *now.secondary));
+    RELIT_ASSIGN(here, wait_for(*secondary, *now.secondary,
+                                std::max(0.0, timeout_s - seconds_since(begin))));
   }
   RELIT_TRY(catch_out_of_memory("showing a frame", [&] { return show(now, true); }));
   return here && !moment.late;

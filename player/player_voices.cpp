@@ -5,13 +5,27 @@
 
 namespace relit::player {
 
-Result<std::unique_ptr<ClipVoice>> Player::State::make_voice(std::size_t clip) {
-  DemuxOptions demux{std::to_string(clip), options.sparing || layers >= 0, options.interrupt};
+// Only the first voice may interrupt the source, which they share: it would stop the others' reads
+// as well.
+Result<std::unique_ptr<ClipVoice>> Player::State::make_voice(std::size_t clip, bool round) {
+  const std::string& name = statics->contents.clips[clip].name;
+  DemuxOptions demux{name.empty() ? std::to_string(clip) : name, options.sparing || layers >= 0,
+                     nullptr};
   RELIT_ASSIGN(ClipDemuxer demuxer, root->another(shared->cursor(), demux));
-  const PrefetchOptions prefetch = prefetch_options(demuxer.layers(), false);
+  const PrefetchOptions prefetch = prefetch_options(demuxer.layers().size(), round);
   RELIT_ASSIGN(auto voice, ClipVoice::create(clip, std::move(demuxer), pool, prefetch));
   RELIT_TRY(attach_voice(*voice));
   return voice;
+}
+
+// One that is shown stays until another one is. One that goes has raised the interrupt to stop its
+// own read.
+void Player::State::drop(std::unique_ptr<ClipVoice>& voice) {
+  if (!voice) return;
+  if (voice.get() == lit) voice.swap(leaving);
+  if (!voice) return;
+  voice.reset();
+  if (options.interrupt && !cancelled.load()) options.interrupt->clear();
 }
 
 Status Player::State::attach_voice(ClipVoice& voice) {
@@ -39,31 +53,38 @@ std::optional<FrameSpan> Player::State::of_frame(std::size_t clip, std::uint64_t
   return std::nullopt;
 }
 
-// The clips that are heard: what was primary becomes secondary where a fade begins, and what has
-// been prepared becomes primary.
 Status Player::State::assign_voices(const Moment& now) {
-  const std::pair<unsigned, std::size_t> item{program, now.item};
-  if (primary_item != item) {
-    const bool fading = now.secondary.has_value();
-    if (fading && primary && primary->clip() == now.secondary->clip) {
-      secondary = std::move(primary);
-    }
-    if (prepared && prepared->clip() == now.primary.clip) primary = std::move(prepared);
-    if (!primary || primary->clip() != now.primary.clip) {
-      if (!shared)
-        return fail(ErrorCode::kUnsupported,
-                    options.name + ": another clip needs a source that can seek");
-      RELIT_ASSIGN(primary, make_voice(now.primary.clip));
-    }
-    prepared.reset();
-    primary_item = item;
-    RELIT_TRY(set_loops());
-  }
+  const std::lock_guard lock(roles);
+  if (primary_item != std::pair(program, now.item)) RELIT_TRY(change_item(now));
   if (now.secondary && (!secondary || secondary->clip() != now.secondary->clip)) {
-    RELIT_ASSIGN(secondary, make_voice(now.secondary->clip));
+    drop(secondary);
+    RELIT_ASSIGN(secondary, make_voice(now.secondary->clip, false));
   }
-  if (!now.secondary) secondary.reset();
+  if (!now.secondary) drop(secondary);
   return prepare_next(now);
+}
+
+// What was primary becomes secondary where a fade begins, and what has been prepared primary.
+Status Player::State::change_item(const Moment& now) {
+  if (now.secondary && primary && primary->clip() == now.secondary->clip) {
+    drop(secondary);
+    secondary = std::move(primary);
+  }
+  if (prepared && prepared->clip() == now.primary.clip) {
+    drop(primary);
+    primary = std::move(prepared);
+  }
+  if (!primary || primary->clip() != now.primary.clip) {
+    if (!shared)
+      return fail(ErrorCode::kUnsupported,
+                  options.name + ": another clip needs a source that can seek");
+    RELIT_ASSIGN(auto voice, make_voice(now.primary.clip, goes_round(now.item)));
+    drop(primary);
+    primary = std::move(voice);
+  }
+  drop(prepared);
+  primary_item = {program, now.item};
+  return set_loops();
 }
 
 // Of a sequence, the item after the one that plays has its first frames decoded when its turn
@@ -77,17 +98,19 @@ Status Player::State::prepare_next(const Moment& now) {
   }
   const bool same = sequence[next].clip == now.primary.clip && !(sequence[next].cross_fade_s > 0);
   if (same) return {};
-  RELIT_ASSIGN(prepared, make_voice(sequence[next].clip));
+  RELIT_ASSIGN(prepared, make_voice(sequence[next].clip, goes_round(next)));
   return {};
+}
+
+bool Player::State::goes_round(std::size_t item) const {
+  if (sequence.empty()) return playback->loops();
+  return item < sequence.size() && sequence[item].repeats > 1;
 }
 
 // Frames are fetched around the end of what goes round.
 Status Player::State::set_loops() {
-  if (!primary || !shared) return {};
-  const bool round = sequence.empty() ? playback->loops()
-                                      : primary_item && primary_item->second < sequence.size() &&
-                                            sequence[primary_item->second].repeats > 1;
-  return primary->prefetcher().set_loop(round);
+  if (!primary || !shared || !primary_item) return {};
+  return primary->prefetcher().set_loop(goes_round(primary_item->second));
 }
 
 }  // namespace relit::player

@@ -27,7 +27,7 @@ Status State::open_decoder(Track& track, std::size_t wanted_count) {
 
 Status State::open_tracks(const PrefetchOptions& options, std::shared_ptr<WorkerPool> workers) {
   pool = std::move(workers);
-  memory = std::make_shared<decoders::PictureMemory>();
+  memory = options.memory ? options.memory : std::make_shared<decoders::PictureMemory>();
   const auto add = [&](std::uint32_t id, int layer, bool exponents) -> Track& {
     tracks.push_back(std::make_unique<Track>());
     tracks.back()->about = {id, layer, exponents, 0};

@@ -29,8 +29,10 @@ struct PrefetchOptions {
   int threads = 0;
   std::vector<std::uint8_t> layers;  ///< wanted ones, not 0; empty: all
   bool planes = true;                ///< false: poses only
-  std::string decoder;               ///< tried first, by libavcodec's name; empty: software
-  std::uint64_t first_frame = 0;     ///< where to begin
+  /// What its pictures are counted in, and got from; null: one of its own.
+  std::shared_ptr<decoders::PictureMemory> memory;
+  std::string decoder;            ///< tried first, by libavcodec's name; empty: software
+  std::uint64_t first_frame = 0;  ///< where to begin
   /// The first picture after the beginning or a jump need not wait for all layers: frame() gives it
   /// with `complete` false as soon as the pose and the most important layer are there.
   bool impatient = true;

@@ -33,13 +33,15 @@
 ///
 /// GL state. The library links no GL: all goes through get_proc_address. relit_gl_attach(),
 /// relit_gl_detach(), relit_update(), relit_wait(), relit_draw() and the two light maps need the
-/// attached context current. They set the state they use and leave: framebuffer binding and
-/// viewport as they were; no program, vertex array (ES 3) or buffer bound and no attribute array
-/// enabled; texture units 0 to 15 as far as used empty, unit 0 active; blending, depth test,
-/// culling and scissor test off; colour and depth masks on; pixel store parameters at GL's
-/// defaults. They expect what only a host changes to be at GL's defaults: stencil test, polygon
-/// offset, sample coverage and rasterizer discard off, no pixel buffers bound, no sampler objects
-/// bound to units used, blend equation ADD.
+/// attached context current. They set all state that they need, whatever the host left, and leave:
+/// framebuffer bindings, viewport and scissor box as they were; no program, renderbuffer, buffer or
+/// vertex array bound, no attribute array enabled (ES 3: those of vertex array 0 as they were), and
+/// attribute 3 at (1, 1, 1, 1); of the texture units used, at most 16 from 0, no 2D or cube texture
+/// nor sampler bound, and unit 0 active; no pixel pack or unpack buffer bound; blending, depth,
+/// cull, scissor and stencil test, polygon offset, sample coverage, alpha to coverage, sample mask
+/// and rasterizer discard off, dithering on; all masks on; blend equation and function, depth
+/// function and range, cull and front face, clear colour and depth, and pixel store at GL's
+/// defaults. Everything else is not touched. No transform feedback may be active.
 
 #define RELIT_VERSION_MAJOR 0
 #define RELIT_VERSION_MINOR 1
@@ -84,11 +86,11 @@ RELIT_API const char* relit_result_name(relit_result result) RELIT_NOEXCEPT;
 
 // ---- memory and messages
 
-/// Where the player's large and long-lived memory comes from: handles, the pictures of the decoders
-/// (most of what a player takes), the light map composited on the CPU, and posed vertices. Small
-/// bookkeeping, the file's static records and what FFmpeg, zstd and the GL driver allocate for
-/// themselves come from the C and C++ runtime; relit_statistics accounts for all of it that a
-/// memory budget counts. Called from any thread, several at once. Must not call the player.
+/// Where a player's handle and its pictures come from: everything that decoders hold and that is
+/// decoded ahead, which is most of what a player takes. The file's static records, the light map
+/// that the processor composites, vertices and small bookkeeping come from the C++ runtime; FFmpeg,
+/// zstd and the GL driver have allocators of their own. Called from any thread, several at once.
+/// Must not call the player. Its functions stay callable until relit_close() has returned.
 typedef struct relit_allocator {
   void* user;
   /// `bytes` > 0; `alignment` is a power of two, 64 at most. NULL: out of memory.
