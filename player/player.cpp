@@ -138,7 +138,7 @@ void Player::State::jumped() {
 }
 
 Status Player::play_clip(std::size_t clip, double cross_fade_s) {
-  if (!seekable() && clip != state_->primary->clip())
+  if (!seekable() && clip < contents().clips.size() && clip != state_->primary->clip())
     return fail(ErrorCode::kUnsupported,
                 state_->options.name + ": another clip needs a source that can seek");
   RELIT_TRY(state_->playback->play_clip(clip, seekable() ? cross_fade_s : 0));
