@@ -75,6 +75,7 @@ Command add_dump(CLI::App& app);
 Command add_light(CLI::App& app);
 Command add_render(CLI::App& app);
 Command add_play(CLI::App& app);
+Command add_stream(CLI::App& app);
 Command add_validate(CLI::App& app);
 Command add_recover(CLI::App& app);
 Command add_remux(CLI::App& app);

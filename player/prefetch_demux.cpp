@@ -2,6 +2,7 @@
 // The demux thread of a Prefetcher.
 #include <algorithm>
 
+#include "container/base/out_of_memory.hpp"
 #include "player/prefetch_state.hpp"
 
 namespace relit::player {
@@ -16,14 +17,27 @@ std::uint64_t State::lap_end() const {
 /// has nothing without the next ones.
 bool State::may_read() const {
   if (error || cancelled) return false;
+  if (start_tick) return true;
   const bool lap_over = ended || come_end >= lap_end();
-  if (lap_over && (!loop || !demuxer.seekable()) && !start_tick) return false;
+  if (lap_over && (!loop || !demuxer.seekable())) return false;
   constexpr std::size_t kMostSegments = 64;
   if (packet_bytes < packet_limit && segments.size() < kMostSegments) return true;
   return starving || (segments.empty() && next_index.has_value());
 }
 
 void State::run() {
+  for (bool on = true; on;) {
+    try {
+      fetch();
+      on = false;
+    } catch (const std::bad_alloc&) {
+      const std::lock_guard lock(mutex);
+      fail_with(out_of_memory("fetching"));
+    }
+  }
+}
+
+void State::fetch() {
   std::unique_lock lock(mutex);
   for (;;) {
     work.wait(lock, [&] { return closing || demux_epoch != epoch || may_read(); });

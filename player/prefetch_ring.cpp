@@ -50,7 +50,9 @@ bool State::admit_one() {
   });
   const bool known = found != segments.end();
   // Frames of segments that never came are lost at once.
-  if (!known && !(demux_lap > admit_lap || index < come_end || ended)) return false;
+  const bool passed =
+      demux_lap > admit_lap || (demux_lap == admit_lap && (index < come_end || ended));
+  if (!known && !passed) return false;
   std::size_t expected = 0;
   for (std::size_t t = 0; known && t < tracks.size(); ++t) {
     if ((*found->wanted)[t] != 0) expected += tracks[t]->picture_bytes;
@@ -154,8 +156,8 @@ void State::restart(std::uint64_t index, std::optional<std::uint64_t> tick) {
 /// Whether going on comes to this frame soon.
 bool State::is_near(std::uint64_t index) const {
   if (demux_epoch != epoch) return false;
-  if (!next_index || index < *next_index || demux_lap != admit_lap) return false;
-  return index < near_end || !demuxer.seekable();
+  if (!next_index || index < *next_index) return false;
+  return index < near_end || demux_lap > admit_lap || !demuxer.seekable();
 }
 
 bool State::ready(const Slot& slot) const {

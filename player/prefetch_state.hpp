@@ -108,6 +108,7 @@ struct Prefetcher::State {
   // prefetch_tracks.cpp
   Status open_tracks(const PrefetchOptions& options, std::shared_ptr<WorkerPool> workers);
   Status open_decoder(Track& track, std::size_t wanted_layers);
+  bool run_strand(std::size_t number);
   bool step(std::size_t number);
   bool begin_step(Track& track, std::unique_lock<std::mutex>& lock);
   bool find_work(Track& track, std::size_t number);
@@ -122,6 +123,7 @@ struct Prefetcher::State {
 
   // prefetch_demux.cpp
   void run();
+  void fetch();
   [[nodiscard]] bool may_read() const;
   void go_to_start(std::unique_lock<std::mutex>& lock);
   void begin_lap(std::unique_lock<std::mutex>& lock);
@@ -154,6 +156,7 @@ struct Prefetcher::State {
   std::uint64_t start = 0;
   std::optional<std::uint64_t> start_tick;
   std::optional<Error> error;
+  bool gone_by = false;  ///< the error is only that what is wanted lies behind
 
   bool loop = false;
   std::uint64_t loop_begin = 0, loop_end = 0;

@@ -46,7 +46,8 @@ Status State::open_tracks(const PrefetchOptions& options, std::shared_ptr<Worker
         decoders::exponent_format(layers[i]);
   }
   for (std::size_t t = 0; t < tracks.size(); ++t) {
-    tracks[t]->strand = std::make_unique<WorkerPool::Strand>(pool, [this, t] { return step(t); });
+    tracks[t]->strand =
+        std::make_unique<WorkerPool::Strand>(pool, [this, t] { return run_strand(t); });
   }
   return options.layers.empty() || options.layers.size() == layers.size()
              ? Status{}
@@ -92,6 +93,7 @@ bool State::begin_step(Track& track, std::unique_lock<std::mutex>& lock) {
       find_work(track, number);
   if (used) return true;
   drop_chunks(track, last_no + 1);
+  packet_bytes -= std::exchange(track.held_bytes, 0);
   lock.unlock();
   track.last.clear();
   track.decoder.reset();
@@ -115,7 +117,7 @@ bool State::find_chunk(Track& track, const Slot& slot) {
   if (!track.inbox.empty() && track.inbox.front().segment_no == slot.segment_no) {
     std::swap(track.chunk, track.inbox.front());
     track.inbox.erase(track.inbox.begin());
-    track.held_bytes = container::storage_bytes(track.chunk.record);
+    if (!track.pose) track.held_bytes = container::storage_bytes(track.chunk.record);
     return true;
   }
   if (closed_no >= slot.segment_no) return true;
@@ -197,6 +199,16 @@ void State::finish_part(Track& track, std::size_t number, std::uint64_t seq, con
   if (ready(slot)) changed.notify_all();
 }
 
+bool State::run_strand(std::size_t number) {
+  try {
+    return step(number);
+  } catch (const std::bad_alloc&) {
+    const std::lock_guard lock(mutex);
+    fail_with(out_of_memory("decoding ahead"));
+    return false;
+  }
+}
+
 bool State::step(std::size_t number) {
   Track& track = *tracks[number];
   std::unique_lock lock(mutex);
@@ -228,7 +240,7 @@ bool State::step(std::size_t number) {
   counts.decode_s += took.count();
   if (!loaded) note_damage(loaded.error());
   if (fresh) {
-    packet_bytes -= std::exchange(track.held_bytes, 0);
+    packet_bytes -= container::storage_bytes(track.chunk.record);
     returned.push_back(std::move(track.chunk.record));
     work.notify_one();
   }
@@ -238,12 +250,9 @@ bool State::step(std::size_t number) {
   }
   finish_part(track, number, seq, decoded, picture);
   track.cursor = std::max(track.cursor, seq + 1);
-  const bool admitted = next_index.has_value();
-  if (admitted) {
-    const std::uint64_t before = tail;
-    admit();
-    if (tail != before) wake();
-  }
+  const std::uint64_t before = tail;
+  admit();
+  if (tail != before) wake();
   return true;
 }
 

@@ -71,6 +71,10 @@ bool Prefetcher::seekable() const { return state_->demuxer.seekable(); }
 void Prefetcher::want(std::uint64_t index) {
   State& s = *state_;
   const std::lock_guard lock(s.mutex);
+  if (std::exchange(s.gone_by, false)) {
+    s.error.reset();
+    s.work.notify_one();
+  }
   if (index == s.wanted_index && !s.error) return;
   s.wanted_index = index;
   s.underrun = false;
@@ -89,7 +93,13 @@ void Prefetcher::want(std::uint64_t index) {
     s.wake();
     return;
   }
-  if (index < s.demuxer.clip().frame_count) s.restart(index, std::nullopt);
+  if (index >= s.demuxer.clip().frame_count) return;
+  if (s.demuxer.seekable()) {
+    s.restart(index, std::nullopt);
+  } else if (!s.error) {
+    s.gone_by = true;
+    s.fail_with(s.demuxer.gone_by(index).error);
+  }
 }
 
 const ClipFrame* Prefetcher::frame(std::uint64_t index) {

@@ -27,6 +27,7 @@ int main(int argc, char** argv) {
                                         {"light", add_light(app)},
                                         {"render", add_render(app)},
                                         {"play", add_play(app)},
+                                        {"stream", add_stream(app)},
                                         {"validate", add_validate(app)},
                                         {"recover", add_recover(app)},
                                         {"remux", add_remux(app)},
