@@ -97,6 +97,8 @@ struct PlaneJob {
   std::ptrdiff_t mantissa_stride = 0;
   const float* steps = nullptr;  ///< one for each texel of the tile, or null
   int zero = 0;
+  int shift = 0;         ///< of the mantissas; one less where every second texel is composited
+  bool wide = false;     ///< two bytes a sample
   float weight[3] = {};  ///< the plane's scale included
   int channel = 0;       ///< when there is only one
   float* out[3] = {};    ///< the tile's first row
@@ -132,24 +134,38 @@ RELIT_KERNEL inline typename V::F value_at(const Row& row, typename V::I zero, i
   return value;
 }
 
-/// out[c] += weight[c] · value, for one channel or all, from texel `x` of the row while a whole
-/// vector is left. Returns the first texel not done.
-template <class V, class Sample, int kShift, bool kStepped, bool kOneChannel>
-RELIT_KERNEL inline int accumulate(const PlaneJob& job, const Row& row, int x, int width) {
-  const auto zero = V::set_int(job.zero);
-  const auto weight0 = V::set(job.weight[kOneChannel ? job.channel : 0]);
-  const auto weight1 = V::set(job.weight[1]);
-  const auto weight2 = V::set(job.weight[2]);
-  float* const out0 = row.out[kOneChannel ? job.channel : 0];
-  float* const out1 = row.out[1];
-  float* const out2 = row.out[2];
+/// out[c] += Σ weight[c] · value of kPlanes planes in turn, for one channel or all, from texel `x`
+/// of the row while a whole vector is left. Returns the first texel not done. Several planes at
+/// once load and store the sum once, and add to it in the same order.
+template <class V, class Sample, int kShift, bool kStepped, bool kOneChannel, int kPlanes>
+RELIT_KERNEL inline int accumulate(const PlaneJob* jobs, const Row* rows, int x, int width) {
+  using F = typename V::F;
+  const auto zero = V::set_int(jobs[0].zero);
+  const int channel = kOneChannel ? jobs[0].channel : 0;
+  F weights[kPlanes][3];
+  for (int p = 0; p < kPlanes; ++p) {
+    weights[p][0] = V::set(jobs[p].weight[channel]);
+    if constexpr (kOneChannel) continue;
+    weights[p][1] = V::set(jobs[p].weight[1]);
+    weights[p][2] = V::set(jobs[p].weight[2]);
+  }
+  float* const out0 = rows[0].out[channel];
+  float* const out1 = rows[0].out[1];
+  float* const out2 = rows[0].out[2];
   for (; x + V::kLanes <= width; x += V::kLanes) {
-    const auto value = value_at<V, Sample, kShift, kStepped>(row, zero, x);
-    V::store(out0 + x, V::add(V::load(out0 + x), V::mul(weight0, value)));
-    if constexpr (!kOneChannel) {
-      V::store(out1 + x, V::add(V::load(out1 + x), V::mul(weight1, value)));
-      V::store(out2 + x, V::add(V::load(out2 + x), V::mul(weight2, value)));
+    F sum0 = V::load(out0 + x), sum1 = sum0, sum2 = sum0;
+    if constexpr (!kOneChannel) sum1 = V::load(out1 + x), sum2 = V::load(out2 + x);
+    for (int p = 0; p < kPlanes; ++p) {
+      const F value = value_at<V, Sample, kShift, kStepped>(rows[p], zero, x);
+      sum0 = V::add(sum0, V::mul(weights[p][0], value));
+      if constexpr (kOneChannel) continue;
+      sum1 = V::add(sum1, V::mul(weights[p][1], value));
+      sum2 = V::add(sum2, V::mul(weights[p][2], value));
     }
+    V::store(out0 + x, sum0);
+    if constexpr (kOneChannel) continue;
+    V::store(out1 + x, sum1);
+    V::store(out2 + x, sum2);
   }
   return x;
 }
@@ -185,52 +201,74 @@ RELIT_KERNEL inline int predict(const PlaneJob& job, const Row& row, int x, int 
   return x;
 }
 
+/// How many planes are added in one pass over a tile.
+constexpr int kMostPlanes = 4;
+
 enum class Operation { kAccumulateOne, kAccumulateAll, kPredict };
 
-template <class V, class Sample, int kShift, bool kStepped>
-RELIT_KERNEL void run_rows(const PlaneJob& job, Operation operation, const Tile& tile) {
+template <class V, class Sample, int kShift, bool kStepped, bool kOneChannel, int kPlanes>
+RELIT_KERNEL void accumulate_rows(const PlaneJob* jobs, const Tile& tile) {
   for (int i = 0; i < tile.height; ++i) {
-    const Row row = row_of<kShift>(job, tile, i);
-    int x = 0;
-    switch (operation) {
-      case Operation::kAccumulateOne:
-        x = accumulate<V, Sample, kShift, kStepped, true>(job, row, x, tile.vector_width);
-        accumulate<Scalar, Sample, kShift, kStepped, true>(job, row, x, tile.width);
-        break;
-      case Operation::kAccumulateAll:
-        x = accumulate<V, Sample, kShift, kStepped, false>(job, row, x, tile.vector_width);
-        accumulate<Scalar, Sample, kShift, kStepped, false>(job, row, x, tile.width);
-        break;
-      case Operation::kPredict:
-        x = predict<V, Sample, kShift, kStepped>(job, row, x, tile.vector_width);
-        predict<Scalar, Sample, kShift, kStepped>(job, row, x, tile.width);
-        break;
-    }
+    Row rows[kPlanes];
+    for (int p = 0; p < kPlanes; ++p) rows[p] = row_of<kShift>(jobs[p], tile, i);
+    const int x = accumulate<V, Sample, kShift, kStepped, kOneChannel, kPlanes>(jobs, rows, 0,
+                                                                                tile.vector_width);
+    accumulate<Scalar, Sample, kShift, kStepped, kOneChannel, kPlanes>(jobs, rows, x, tile.width);
+  }
+}
+
+template <class V, class Sample, int kShift, bool kStepped, bool kOneChannel>
+RELIT_KERNEL void accumulate_planes(const PlaneJob* jobs, int count, const Tile& tile) {
+  if (count == kMostPlanes)
+    return accumulate_rows<V, Sample, kShift, kStepped, kOneChannel, kMostPlanes>(jobs, tile);
+  for (int p = 0; p < count; ++p)
+    accumulate_rows<V, Sample, kShift, kStepped, kOneChannel, 1>(jobs + p, tile);
+}
+
+template <class V, class Sample, int kShift, bool kStepped>
+RELIT_KERNEL void run_rows(const PlaneJob* jobs, int count, Operation operation, const Tile& tile) {
+  switch (operation) {
+    case Operation::kAccumulateOne:
+      return accumulate_planes<V, Sample, kShift, kStepped, true>(jobs, count, tile);
+    case Operation::kAccumulateAll:
+      return accumulate_planes<V, Sample, kShift, kStepped, false>(jobs, count, tile);
+    case Operation::kPredict:
+      break;
+  }
+  for (int i = 0; i < tile.height; ++i) {
+    const Row row = row_of<kShift>(jobs[0], tile, i);
+    const int x = predict<V, Sample, kShift, kStepped>(jobs[0], row, 0, tile.vector_width);
+    predict<Scalar, Sample, kShift, kStepped>(jobs[0], row, x, tile.width);
   }
 }
 
 template <class V, class Sample, int kShift>
-RELIT_KERNEL void run_sampled(const PlaneJob& job, Operation operation, const Tile& tile) {
-  if (job.steps != nullptr) return run_rows<V, Sample, kShift, true>(job, operation, tile);
-  run_rows<V, Sample, kShift, false>(job, operation, tile);
+RELIT_KERNEL void run_sampled(const PlaneJob* jobs, int count, Operation operation,
+                              const Tile& tile) {
+  if (jobs[0].steps != nullptr)
+    return run_rows<V, Sample, kShift, true>(jobs, count, operation, tile);
+  run_rows<V, Sample, kShift, false>(jobs, count, operation, tile);
 }
 
 template <class V, class Sample>
-RELIT_KERNEL void run_shifted(const PlaneJob& job, int shift, Operation operation,
+RELIT_KERNEL void run_shifted(const PlaneJob* jobs, int count, Operation operation,
                               const Tile& tile) {
-  if (shift < 0) return run_sampled<V, Sample, -1>(job, operation, tile);
-  if (shift > 0) return run_sampled<V, Sample, 1>(job, operation, tile);
-  run_sampled<V, Sample, 0>(job, operation, tile);
+  if (jobs[0].shift < 0) return run_sampled<V, Sample, -1>(jobs, count, operation, tile);
+  if (jobs[0].shift > 0) return run_sampled<V, Sample, 1>(jobs, count, operation, tile);
+  run_sampled<V, Sample, 0>(jobs, count, operation, tile);
 }
 
-/// `halved`: 1 where every second texel is composited, by which there is one sample more a texel.
+/// Adds planes of one kind (see same_kind()) to a tile, in turn.
 template <class V>
-RELIT_KERNEL void run_plane(const PlaneView& plane, int halved, const PlaneJob& job,
-                            Operation operation, const Tile& tile) {
-  const int shift = plane.mantissa_shift - halved;
-  if (plane.mantissa.bytes_per_sample == 1)
-    return run_shifted<V, std::uint8_t>(job, shift, operation, tile);
-  run_shifted<V, std::uint16_t>(job, shift, operation, tile);
+RELIT_KERNEL void run_planes(const PlaneJob* jobs, int count, Operation operation,
+                             const Tile& tile) {
+  if (jobs[0].wide) return run_shifted<V, std::uint16_t>(jobs, count, operation, tile);
+  run_shifted<V, std::uint8_t>(jobs, count, operation, tile);
+}
+
+RELIT_KERNEL inline bool same_kind(const PlaneJob& a, const PlaneJob& b) {
+  return a.wide == b.wide && a.shift == b.shift && a.zero == b.zero &&
+         (a.steps == nullptr) == (b.steps == nullptr);
 }
 
 template <class V, int kShift>
@@ -342,8 +380,10 @@ RELIT_KERNEL void saturate(const CompositeJob& job, const Tile& tile) {
 RELIT_KERNEL inline int aim(const CompositeJob& job, std::size_t k, const Tile& tile,
                             PlaneJob& out) {
   const PlaneView& plane = job.planes[k];
-  out.mantissas = plane.mantissa.data + sample_at(tile.x, plane.mantissa_shift - (job.every - 1)) *
-                                            plane.mantissa.bytes_per_sample;
+  out.shift = plane.mantissa_shift - (job.every - 1);
+  out.wide = plane.mantissa.bytes_per_sample == 2;
+  out.mantissas =
+      plane.mantissa.data + sample_at(tile.x, out.shift) * plane.mantissa.bytes_per_sample;
   out.mantissa_stride = plane.mantissa.stride_bytes;
   out.zero = plane.mantissa_zero;
   out.out_stride = job.out_width();
@@ -360,26 +400,74 @@ RELIT_KERNEL inline int aim(const CompositeJob& job, std::size_t k, const Tile& 
   return used;
 }
 
+/// Planes that wait to be added together: those of one channel in a queue each, those of all
+/// channels in the last. Every channel gets its planes in their order.
+template <class V>
+class Queues {
+ public:
+  RELIT_KERNEL explicit Queues(const Tile& tile) : tile_(tile) {}
+
+  RELIT_KERNEL void add(const PlaneJob& job, int channels) {
+    Queue& queue = queues_[channels == 1 ? job.channel : kAll];
+    // Planes of all channels and of one must not overtake each other.
+    if (channels == 1 && queues_[kAll].count > 0) flush(kAll);
+    if (channels > 1) {
+      for (int c = 0; c < kAll; ++c) flush(c);
+    }
+    if (queue.count > 0 && !same_kind(queue.jobs[0], job))
+      flush(channels == 1 ? job.channel : kAll);
+    queue.jobs[queue.count++] = job;
+    if (queue.count == kMostPlanes) flush(channels == 1 ? job.channel : kAll);
+  }
+  RELIT_KERNEL void flush_all() {
+    for (int c = 0; c <= kAll; ++c) flush(c);
+  }
+
+ private:
+  static constexpr int kAll = 3;
+  struct Queue {
+    PlaneJob jobs[kMostPlanes];
+    int count = 0;
+  };
+
+  RELIT_KERNEL void flush(int index) {
+    Queue& queue = queues_[index];
+    if (queue.count == 0) return;
+    run_planes<V>(queue.jobs, queue.count,
+                  index == kAll ? Operation::kAccumulateAll : Operation::kAccumulateOne, tile_);
+    queue.count = 0;
+  }
+
+  const Tile& tile_;
+  Queue queues_[kAll + 1];
+};
+
 template <class V>
 RELIT_KERNEL void run_tile(const CompositeJob& job, const Tile& tile) {
-  alignas(32) float steps[Tile::kTexels];
-  const PlaneView* stepped = nullptr;  // whose steps those are: an RGB group shares them
-  const int halved = job.every - 1;
+  // As many sets of steps as there can be planes waiting that need different ones.
+  alignas(32) float steps[kMostPlanes][Tile::kTexels];
+  int used_steps = 0;
+  const PlaneView* stepped = nullptr;  // whose steps the last are: an RGB group shares them
+  Queues<V> queues(tile);
   fill<V>(job, tile);
   for (std::size_t k = 0; k < job.planes.size(); ++k) {
     const PlaneView& plane = job.planes[k];
     const bool predicts = static_cast<int>(k) == job.light.prediction_plane;
     PlaneJob add;
-    const int used = aim(job, k, tile, add);
-    if (plane.mantissa.empty() || (used == 0 && !predicts)) continue;
+    const int channels = aim(job, k, tile, add);
+    if (plane.mantissa.empty() || (channels == 0 && !predicts)) continue;
     if (!plane.exponent.empty()) {
-      if (stepped == nullptr || !same_steps(*stepped, plane))
-        tile_steps<V>(plane, halved, tile, steps);
+      if (stepped == nullptr || !same_steps(*stepped, plane)) {
+        if (used_steps == kMostPlanes) {
+          queues.flush_all();
+          used_steps = 0;
+        }
+        tile_steps<V>(plane, job.every - 1, tile, steps[used_steps++]);
+      }
       stepped = &plane;
-      add.steps = steps;
+      add.steps = steps[used_steps - 1];
     }
-    if (used == 1) run_plane<V>(plane, halved, add, Operation::kAccumulateOne, tile);
-    if (used > 1) run_plane<V>(plane, halved, add, Operation::kAccumulateAll, tile);
+    if (channels > 0) queues.add(add, channels);
     if (predicts) {
       float factors[9][3];
       fold_prediction(job.light, plane.scale, factors);
@@ -388,9 +476,11 @@ RELIT_KERNEL void run_tile(const CompositeJob& job, const Tile& tile) {
                                      static_cast<std::size_t>(job.out_width()) +
                                  static_cast<std::size_t>(tile.x)]
                          .x;
-      run_plane<V>(plane, halved, add, Operation::kPredict, tile);
+      queues.flush_all();
+      run_planes<V>(&add, 1, Operation::kPredict, tile);
     }
   }
+  queues.flush_all();
   saturate<V>(job, tile);
 }
 

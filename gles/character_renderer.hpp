@@ -49,7 +49,8 @@ class CharacterRenderer {
   /// kOutOfMemory.
   Status set_meshes(std::span<const MeshView> meshes);
 
-  /// The posed vertices of a mesh, model space, vertex_count of them. Errors: kInvalid.
+  /// The posed vertices of a mesh, model space, vertex_count of them. Of GL's state it touches only
+  /// the array buffer's binding, which it leaves empty. Errors: kInvalid.
   Status update_positions(std::size_t mesh, std::span<const glm::vec3> positions);
 
   /// What is behind the meshes.

@@ -66,7 +66,9 @@ Result<std::unique_ptr<Compositor>> Compositor::create(const Device& device,
                     std::to_string(c.pass_count()) +
                     " passes on this GPU, which cannot add them up in the light map's format; "
                     "composite on the CPU (--composite cpu)");
-  for (Pass& pass : c.passes_) RELIT_TRY(c.build_pass(pass));
+  for (Pass& pass : c.passes_) pass.weights = pass.planes.make_weights();
+  // One shader to begin with, so that what a driver refuses comes out here.
+  RELIT_TRY(c.build_first_shader());
   RELIT_TRY(c.make_target(c.targets_[0], description.width, description.height));
   if (c.storage_.format == LightMapFormat::kSquareRoot8)
     c.samples_.resize(static_cast<std::size_t>(c.sheets_.slot_count()) * description.planes.size() *
@@ -75,51 +77,54 @@ Result<std::unique_ptr<Compositor>> Compositor::create(const Device& device,
   return compositor;
 }
 
-Status Compositor::build_pass(Pass& pass) {
-  pass.uniforms = pass.planes.make_uniforms();
-  const bool unrolled = limits_of(device_).lookups > 0;
-  const auto lookups =
-      unrolled
-          ? static_cast<std::size_t>(pass.planes.group_count() * pass.planes.lookups_per_group())
-          : std::size_t{0};
-  std::string varyings, assignments, defines;
-  for (std::size_t i = 0; i < lookups; ++i) {
-    const std::string v = "v" + std::to_string(i);
-    varyings += "VARYING vec2 " + v + ";\n";
-    assignments += v + " = PLACE(" + std::to_string(i) + "); ";
-  }
-  if (lookups > 0)
-    defines += "LOOKUPS " + std::to_string(lookups) + "\nASSIGN_PLACES " + assignments + "\n";
-  if (storage_.format == LightMapFormat::kSquareRoot8) defines += "SQUARE_ROOT 1\n";
-  std::string sum;
-  if (storage_.format == LightMapFormat::kSquareRoot8) sum = "uniform float u_to_unit;\n";
-  if (unrolled) {
-    sum += pass.planes.samplers() + pass.planes.unrolled_uniforms() +
-           "void main() {\n  vec3 sum = u_constant;\n" + pass.planes.unrolled_statements();
+bool Compositor::has_lookups() const { return device_.profile() == Profile::kEs2Mediump; }
+
+// All planes of one frame.
+Status Compositor::build_first_shader() {
+  Pass& pass = passes_.front();
+  RELIT_ASSIGN(Shader shader, build_shader(pass, pass.planes.all_of_one_frame()));
+  pass.shaders.push_back(std::move(shader));
+  return {};
+}
+
+Result<Compositor::Shader*> Compositor::shader_for(Pass& pass) {
+  for (Shader& shader : pass.shaders)
+    if (has_lookups() || shader.counts == pass.weights.counts) return &shader;
+  RELIT_ASSIGN(Shader shader, build_shader(pass, pass.weights.counts));
+  return &pass.shaders.emplace_back(std::move(shader));
+}
+
+Result<Compositor::Shader> Compositor::build_shader(const Pass& pass,
+                                                    std::span<const int> counts) const {
+  const bool roots = storage_.format == LightMapFormat::kSquareRoot8;
+  std::string vertex_text, sum = roots ? "uniform float u_to_unit;\n" : "";
+  if (has_lookups()) {
+    const PlanePass::LookupText text = pass.planes.lookup_text(sheets_);
+    vertex_text =
+        text.varyings + std::string(shaders::composite_lookup_vert) + text.assignments + "}\n";
+    sum += text.varyings + text.uniforms + "void main() {\n  vec3 sum = u_constant;\n" +
+           text.statements;
   } else {
-    sum += pass.planes.text(PlaneTaps::kOne) +
+    vertex_text = shaders::composite_vert;
+    sum += pass.planes.text(PlaneTaps::kOne, counts, sheets_) +
            "VARYING vec2 v_texel;\nvoid main() {\n  tap_at = v_texel;\n  vec3 sum = plane_sum();\n";
   }
-  const std::string_view vertex[] = {varyings, shaders::composite_vert};
-  const std::string_view fragment[] = {varyings, shaders::dither, sum, shaders::composite_tail};
+  const std::string_view vertex[] = {vertex_text};
+  const std::string_view fragment[] = {shaders::dither, sum, shaders::composite_tail};
   const std::string_view attributes[] = {"a_position"};
-  RELIT_ASSIGN(pass.program, build_program(device_.gl(), device_.profile(),
-                                           {"composite", defines, vertex, fragment, attributes}));
   const Functions& gl = device_.gl();
-  const GLuint program = pass.program.name();
-  pass.constant = gl.GetUniformLocation(program, "u_constant");
-  pass.texels = gl.GetUniformLocation(program, "u_texels");
-  pass.to_unit = gl.GetUniformLocation(program, "u_to_unit");
-  pass.place = gl.GetUniformLocation(program, "u_place");
-  pass.weight = gl.GetUniformLocation(program, "u_weight");
+  Shader shader;
+  shader.counts.assign(counts.begin(), counts.end());
+  RELIT_ASSIGN(shader.program, build_program(gl, device_.profile(),
+                                             {"composite", roots ? "SQUARE_ROOT 1\n" : "", vertex,
+                                              fragment, attributes}));
+  const GLuint program = shader.program.name();
+  shader.constant = gl.GetUniformLocation(program, "u_constant");
+  shader.texels = gl.GetUniformLocation(program, "u_texels");
+  shader.to_unit = gl.GetUniformLocation(program, "u_to_unit");
   gl.UseProgram(program);
-  pass.locations = pass.planes.locate(gl, pass.program, unit_of);
-  if (!unrolled) return {};
-  places_.resize(std::max(places_.size(), 4 * lookups));
-  weights_.resize(std::max(
-      weights_.size(),
-      4 * static_cast<std::size_t>(pass.planes.group_count() * pass.planes.planes_per_group())));
-  return {};
+  shader.locations = pass.planes.locate(gl, shader.program, unit_of);
+  return shader;
 }
 
 Status Compositor::make_target(Target& target, int width, int height) const {
@@ -251,72 +256,42 @@ Result<LightMap> Compositor::composite_into(Target& target, const FoldedLight& l
   gl.BindFramebuffer(GL_FRAMEBUFFER, target.framebuffer.name());
   gl.Viewport(0, 0, target.width, target.height);
   bool first = true;
-  for (Pass& pass : passes_)
-    if (draw_pass(pass, drawing, first)) first = false;
+  for (Pass& pass : passes_) {
+    RELIT_ASSIGN(const bool drawn, draw_pass(pass, drawing, first));
+    if (drawn) first = false;
+  }
   drawn_ = &target;
   RELIT_TRY(device_.check("compositing"));
   return result_;
 }
 
-bool Compositor::draw_pass(Pass& pass, const Drawing& drawing, bool first) {
-  const bool any = pass.planes.fill(drawing.light, drawing.frames, sheets_, drawing.normalisation,
-                                    pass.uniforms);
+Result<bool> Compositor::draw_pass(Pass& pass, const Drawing& drawing, bool first) {
+  pass.planes.fill(drawing.light, drawing.frames, sheets_, drawing.normalisation, pass.weights);
   // Only one pass need run where nothing has a weight: somebody has to write the constant.
-  if (!any && (!first || &pass != &passes_.back())) return false;
+  if (!pass.weights.any && (!first || &pass != &passes_.back())) return false;
 
   const Functions& gl = device_.gl();
-  gl.UseProgram(pass.program.name());
+  RELIT_ASSIGN(const Shader* shader, shader_for(pass));
+  gl.UseProgram(shader->program.name());
   pass.planes.bind(gl, drawing.frames, sheets_, unit_of);
   const double scale = first ? 1 / drawing.normalisation : 0;
   std::array<float, 3> constant{};
   for (std::size_t c = 0; c < 3; ++c)
-    constant[c] = static_cast<float>(static_cast<double>(drawing.light.constant[c]) * scale);
-  gl.Uniform3f(pass.constant, constant[0], constant[1], constant[2]);
-  gl.Uniform4f(pass.texels, drawing.texels[0], drawing.texels[1], drawing.texels[2],
+    constant[c] = static_cast<float>(static_cast<double>(drawing.light.constant[c]) * scale +
+                                     pass.weights.constant[c]);
+  gl.Uniform3f(shader->constant, constant[0], constant[1], constant[2]);
+  gl.Uniform4f(shader->texels, drawing.texels[0], drawing.texels[1], drawing.texels[2],
                drawing.texels[3]);
-  if (pass.to_unit >= 0)
-    gl.Uniform1f(pass.to_unit,
+  if (shader->to_unit >= 0)
+    gl.Uniform1f(shader->to_unit,
                  static_cast<float>(drawing.normalisation / static_cast<double>(result_.scale)));
-  if (pass.place >= 0) {
-    set_lookups(pass);
-  } else {
-    pass.planes.set_uniforms(gl, pass.locations, pass.uniforms);
-  }
+  pass.planes.set_weights(gl, shader->locations, pass.weights);
   if (!first) {
     gl.Enable(GL_BLEND);
     gl.BlendFunc(GL_ONE, GL_ONE);
   }
   device_.draw_fullscreen();
   return true;
-}
-
-// Groups with a weight take the first varyings; the rest repeat the first place with no weight.
-// PlanePass left [place, weight]… per group; here places and weights go to different stages.
-void Compositor::set_lookups(const Pass& pass) {
-  const auto planes = static_cast<std::size_t>(pass.planes.planes_per_group());
-  const auto lookups = static_cast<std::size_t>(pass.planes.lookups_per_group());
-  const auto stride = static_cast<std::size_t>(pass.planes.stride());
-  const auto groups = static_cast<std::size_t>(pass.planes.group_count());
-  const PlanePass::Uniforms::Part& part = pass.uniforms.parts.front();
-  std::fill(weights_.begin(), weights_.end(), 0.0f);
-  // E_ref of the unused ones: 2^(E - 255) is at most 1, and never an infinity that 0 would not
-  // cancel.
-  for (std::size_t i = 3; i < weights_.size(); i += 4) weights_[i] = 255;
-  for (std::size_t g = 0; g < groups; ++g) {
-    const bool used = g < static_cast<std::size_t>(part.count);
-    const float* group = part.data.data() + (used ? 4 * g * stride : 0);
-    for (std::size_t i = 0; i < lookups; ++i) {
-      const float* place = group + (i < planes ? 8 * i : 4 * (stride - 1));
-      std::copy(place, place + 4,
-                places_.begin() + static_cast<std::ptrdiff_t>(4 * (g * lookups + i)));
-      if (i < planes && used)
-        std::copy(place + 4, place + 8,
-                  weights_.begin() + static_cast<std::ptrdiff_t>(4 * (g * planes + i)));
-    }
-  }
-  const Functions& gl = device_.gl();
-  gl.Uniform4fv(pass.place, static_cast<GLsizei>(groups * lookups), places_.data());
-  gl.Uniform4fv(pass.weight, static_cast<GLsizei>(groups * planes), weights_.data());
 }
 
 Status Compositor::prepare_fused() {
@@ -349,7 +324,7 @@ Status Compositor::read_back(std::span<float> out) {
 
 int Compositor::pass_count() const {
   return static_cast<int>(std::count_if(passes_.begin(), passes_.end(), [](const Pass& pass) {
-    return pass.planes.has_role(0) || pass.planes.unit_count() == 0;
+    return pass.planes.serves_one_frame();
   }));
 }
 
@@ -365,8 +340,7 @@ std::size_t Compositor::gpu_bytes() const {
 }
 
 std::size_t Compositor::cpu_bytes() const {
-  return sheets_.cpu_bytes() +
-         sizeof(float) * (places_.size() + weights_.size() + samples_.size() + pixels_.capacity());
+  return sheets_.cpu_bytes() + sizeof(float) * (samples_.size() + pixels_.capacity());
 }
 
 }  // namespace relit::gles

@@ -20,15 +20,17 @@ namespace relit::gles {
 /// section 3.3; here with signed mantissas and any matrix). composite() adds in texture space, one
 /// fragment a texel; fuse() leaves the sum to the shader that draws the meshes.
 ///
-/// In texture space everything fits one pass where uniforms and texture units allow it (about 100
-/// planes on ES 3, 27 to 48 on ES 2). More planes, and all but the smallest sets with half-float
-/// fragments (at most 16 lookups a pass, for their addresses must be varyings), take several passes
-/// that add up in the half-float target. Values are scaled by a power of two so that no sum leaves
-/// the range of half floats, and exponents count from the frame's largest one.
+/// In texture space everything fits one pass where uniforms and texture units allow it (200 planes
+/// and more on ES 3, some 100 on most of ES 2). More planes, and all but the smallest sets with
+/// half-float fragments (at most 16 lookups a pass, for their addresses must be varyings), take
+/// several passes that add up in the half-float target. Values are scaled by a power of two so that
+/// no sum leaves the range of half floats, and exponents count from the frame's largest one.
 ///
 /// Where planes change every frame there are two slots that hold a frame each, and a blend of both
-/// is the same sum with twice the planes. Steady state allocates nothing. GL state: see Device. One
-/// thread, the context's.
+/// is the same sum with twice the planes. Shaders are straight lines for the number of planes that
+/// have a weight, in a few shades, and compiled when first needed: with the light's first frame,
+/// with its first blend. Besides, steady state allocates nothing. GL state: see Device. One thread,
+/// the context's.
 class Compositor {
  public:
   /// Compiles the shaders and allocates textures. Errors: kInvalid, kLimit (planes too large),
@@ -86,16 +88,19 @@ class Compositor {
   [[nodiscard]] std::size_t cpu_bytes() const;
 
  private:
-  struct Pass {
-    PlanePass planes;
-    PlanePass::Uniforms uniforms;
+  // A shader for so many groups of each batch of a pass; for any number where lookups are varyings.
+  struct Shader {
+    std::vector<int> counts;
     PlanePass::Locations locations;
     Program program;
     GLint constant = -1;
     GLint texels = -1;
     GLint to_unit = -1;
-    GLint place = -1;  // lookups as varyings only
-    GLint weight = -1;
+  };
+  struct Pass {
+    PlanePass planes;
+    PlanePass::Weights weights;
+    std::vector<Shader> shaders;
   };
   struct Target {
     int width = 0, height = 0;
@@ -105,7 +110,10 @@ class Compositor {
 
   explicit Compositor(const Device& device) : device_(device) {}
 
-  Status build_pass(Pass& pass);
+  [[nodiscard]] bool has_lookups() const;
+  Result<Shader> build_shader(const Pass& pass, std::span<const int> counts) const;
+  Status build_first_shader();
+  Result<Shader*> shader_for(Pass& pass);
   Status make_target(Target& target, int width, int height) const;
   void sample_planes(std::span<const PlaneView> planes, int slot);
   [[nodiscard]] double sampled_peak(const FoldedLight& light, const FrameSlots& frames) const;
@@ -119,8 +127,7 @@ class Compositor {
                                   const FrameSlots& frames, bool half_size);
   Result<LightMap> composite_apart(const FoldedLight& light, const FrameSlots& frames,
                                    bool half_size);
-  bool draw_pass(Pass& pass, const Drawing& drawing, bool first);
-  void set_lookups(const Pass& pass);
+  Result<bool> draw_pass(Pass& pass, const Drawing& drawing, bool first);
 
   const Device& device_;
   PlaneSetDescription description_;
@@ -135,8 +142,6 @@ class Compositor {
   const Target* drawn_ = nullptr;
   LightMapMixer* mixed_ = nullptr;  // who holds the last composite instead of drawn_; null: nobody
   int last_slot_ = -1;
-  std::vector<float> places_;   // lookups as varyings: vertex uniforms
-  std::vector<float> weights_;  // … and those of the fragments
   std::vector<float> samples_;  // square roots: [slot][plane][kSamples], for the peak
   std::vector<float> pixels_;   // read_back()'s
 };

@@ -39,7 +39,8 @@ Result<std::unique_ptr<FusedLight>> FusedLight::create(const Device& device,
                     " uniforms for them; composite in texture space or on the CPU");
   std::unique_ptr<FusedLight> fused(new FusedLight(sheets));
   fused->pass_ = std::move(passes.front());
-  fused->uniforms_ = fused->pass_.make_uniforms();
+  fused->weights_ = fused->pass_.make_weights();
+  fused->variants_.emplace_back().counts = fused->pass_.all_of_one_frame();
   fused->width_ = description.width;
   fused->height_ = description.height;
   return fused;
@@ -47,9 +48,15 @@ Result<std::unique_ptr<FusedLight>> FusedLight::create(const Device& device,
 
 Status FusedLight::set(const FoldedLight& light, const FrameSlots& frames) {
   RELIT_ASSIGN(const double normalisation, PlanePass::normalise(light, frames, sheets_));
-  pass_.fill(light, frames, sheets_, normalisation, uniforms_);
+  pass_.fill(light, frames, sheets_, normalisation, weights_);
+  const auto known = std::find_if(variants_.begin(), variants_.end(), [&](const Variant& variant) {
+    return variant.counts == weights_.counts;
+  });
+  variant_ = static_cast<std::size_t>(known - variants_.begin());
+  if (known == variants_.end()) variants_.emplace_back().counts = weights_.counts;
   for (std::size_t c = 0; c < 3; ++c)
-    constant_[c] = static_cast<float>(static_cast<double>(light.constant[c]) / normalisation);
+    constant_[c] = static_cast<float>(static_cast<double>(light.constant[c]) / normalisation +
+                                      weights_.constant[c]);
   scale_ = static_cast<float>(normalisation);
   magnitude_ = light.magnitude;
   frames_ = frames;
@@ -58,7 +65,8 @@ Status FusedLight::set(const FoldedLight& light, const FrameSlots& frames) {
 }
 
 std::string FusedLight::text() const {
-  return pass_.text(PlaneTaps::kFour) + std::string(shaders::composite_fused);
+  return pass_.text(PlaneTaps::kFour, variants_[variant_].counts, sheets_) +
+         std::string(shaders::composite_fused);
 }
 
 void FusedLight::locate(const Functions& gl, CharacterShader& shader) const {
@@ -74,7 +82,7 @@ void FusedLight::apply(const Functions& gl, CharacterShader& shader) const {
   if (shader.fused_serial == serial_) return;
   shader.fused_serial = serial_;
   gl.Uniform3f(shader.constant, constant_[0], constant_[1], constant_[2]);
-  pass_.set_uniforms(gl, shader.planes, uniforms_);
+  pass_.set_weights(gl, shader.planes, weights_);
 }
 
 }  // namespace relit::gles

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "gles/character_shaders.hpp"
 #include "gles/plane_pass.hpp"
@@ -35,23 +36,28 @@ class FusedLight {
   void locate(const Functions& gl, CharacterShader& shader) const;
   /// Binds the planes' textures; leaves unit 0 active.
   void bind(const Functions& gl) const;
-  /// Sets the uniforms of the program in use, unless it has them already.
+  /// Sets the weights of the program in use, unless it has them already.
   void apply(const Functions& gl, CharacterShader& shader) const;
-  /// The programs that were compiled with its text.
-  [[nodiscard]] CharacterShaders& shaders() { return shaders_; }
+  /// The programs that were compiled with its text of the moment.
+  [[nodiscard]] CharacterShaders& shaders() { return variants_[variant_].shaders; }
 
  private:
   explicit FusedLight(const PlaneSheets& sheets) : sheets_(sheets) {}
 
   const PlaneSheets& sheets_;
   PlanePass pass_;
-  PlanePass::Uniforms uniforms_;
+  PlanePass::Weights weights_;
   std::array<float, 3> constant_{};
   float scale_ = 1, magnitude_ = 1;
   FrameSlots frames_;
   int width_ = 0, height_ = 0;
-  std::uint64_t serial_ = 0;  // of the uniforms
-  CharacterShaders shaders_;
+  std::uint64_t serial_ = 0;  // of the weights
+  struct Variant {
+    std::vector<int> counts;
+    CharacterShaders shaders;
+  };
+  std::vector<Variant> variants_;  // by number of planes
+  std::size_t variant_ = 0;
 };
 
 }  // namespace relit::gles

@@ -35,6 +35,7 @@ std::vector<PlanePass::Batch> PlanePass::group_planes(const PlaneSetDescription&
     for (int slot = 0; slot < kind.planes_per_group; ++slot) {
       const std::size_t plane = first + static_cast<std::size_t>(std::min(slot, count - 1));
       kind.sheets[static_cast<std::size_t>(slot)] = sheets.mantissa(plane).sheet;
+      group.channels[static_cast<std::size_t>(slot)] = d.planes[plane].channels;
       if (slot < count) group.planes[static_cast<std::size_t>(slot)] = static_cast<int>(plane);
     }
     auto at = std::find_if(batches.begin(), batches.end(),
@@ -84,8 +85,8 @@ std::vector<PlanePass> PlanePass::plan(const PlaneSetDescription& description,
     while (taken < batch.groups.size()) {
       std::vector<int> needed = passes.back().sheets_with(batch);
       const bool empty = passes.back().batches_.empty();
-      int room =
-          limits.lookups > 0 ? limits.lookups / batch.lookups() : vectors_left / batch.stride();
+      int room = limits.lookups > 0 ? limits.lookups / batch.lookups()
+                                    : vectors_left / batch.planes_per_group;
       if (limits.lookups > 0 && !empty) room = 0;
       if (static_cast<int>(needed.size()) > limits.units) room = 0;
       if (room < 1 && !empty) {
@@ -99,36 +100,37 @@ std::vector<PlanePass> PlanePass::plan(const PlaneSetDescription& description,
       const auto begin = batch.groups.begin() + static_cast<std::ptrdiff_t>(taken);
       part.groups.assign(begin, begin + static_cast<std::ptrdiff_t>(count));
       taken += count;
-      vectors_left -= static_cast<int>(count) * part.stride();
+      vectors_left -= part.count() * part.planes_per_group;
       passes.back().sheets_ = std::move(needed);
       passes.back().batches_.push_back(std::move(part));
     }
   }
+  for (PlanePass& pass : passes) pass.lookups_ = limits.lookups > 0;
   return passes;
 }
 
 bool PlanePass::within(const Limits& limits) const {
   int vectors = 0;
-  for (const Batch& batch : batches_)
-    vectors += static_cast<int>(batch.groups.size()) * batch.stride();
+  for (const Batch& batch : batches_) vectors += batch.count() * batch.planes_per_group;
   return vectors <= limits.vectors && unit_count() <= limits.units;
 }
 
-bool PlanePass::has_role(int role) const {
-  return std::any_of(batches_.begin(), batches_.end(),
-                     [&](const Batch& batch) { return batch.role == role; });
+bool PlanePass::serves_one_frame() const {
+  return batches_.empty() || std::any_of(batches_.begin(), batches_.end(),
+                                         [](const Batch& batch) { return batch.role == 0; });
 }
 
-int PlanePass::planes_per_group() const {
-  return batches_.empty() ? 0 : batches_.front().planes_per_group;
+std::vector<int> PlanePass::all_of_one_frame() const {
+  std::vector<int> counts;
+  for (const Batch& batch : batches_) counts.push_back(batch.role == 0 ? batch.count() : 0);
+  return counts;
 }
-int PlanePass::lookups_per_group() const {
-  return batches_.empty() ? 0 : batches_.front().lookups();
+
+// A group of one or two planes repeats its first one, without a weight.
+std::size_t PlanePass::plane_of(const Group& group, int slot) {
+  const int plane = group.planes[static_cast<std::size_t>(slot)];
+  return static_cast<std::size_t>(plane >= 0 ? plane : group.planes[0]);
 }
-int PlanePass::group_count() const {
-  return batches_.empty() ? 0 : static_cast<int>(batches_.front().groups.size());
-}
-int PlanePass::stride() const { return batches_.empty() ? 0 : batches_.front().stride(); }
 
 Result<double> PlanePass::normalise(const FoldedLight& light, const FrameSlots& frames,
                                     const PlaneSheets& sheets) {
@@ -150,6 +152,11 @@ Result<double> PlanePass::normalise(const FoldedLight& light, const FrameSlots& 
     if (!is_finite(light.weights[k]))
       return fail(ErrorCode::kInvalid,
                   "the weight of plane " + std::to_string(k) + " is not finite");
+    for (std::size_t c = 0; c < 3; ++c)
+      if (light.weights[k][c] != 0 && (sheets.channels(k) >> c & 1u) == 0)
+        return fail(
+            ErrorCode::kInvalid,
+            "plane " + std::to_string(k) + " has a weight for a channel it was described without");
     for (int role = 0; role < FrameSlots::kRoles; ++role)
       for (std::size_t c = 0; c < 3; ++c)
         bound[c] += std::abs(static_cast<double>(frames.weight(role)) *
@@ -164,89 +171,87 @@ Result<double> PlanePass::normalise(const FoldedLight& light, const FrameSlots& 
   return std::ldexp(1.0, exponent - kSumExponent);
 }
 
-PlanePass::Uniforms PlanePass::make_uniforms() const {
-  Uniforms uniforms;
+PlanePass::Weights PlanePass::make_weights() const {
+  Weights weights;
   for (const Batch& batch : batches_) {
-    Uniforms::Part& part = uniforms.parts.emplace_back();
-    part.data.resize(4 * batch.groups.size() * static_cast<std::size_t>(batch.stride()));
+    weights.data.emplace_back(4 * batch.groups.size() *
+                              static_cast<std::size_t>(batch.planes_per_group));
+    weights.counts.push_back(0);
   }
-  return uniforms;
+  return weights;
 }
 
-bool PlanePass::fill(const FoldedLight& light, const FrameSlots& frames, const PlaneSheets& sheets,
-                     double normalisation, Uniforms& out) const {
-  bool any = false;
+void PlanePass::fill(const FoldedLight& light, const FrameSlots& frames, const PlaneSheets& sheets,
+                     double normalisation, Weights& out) const {
+  constexpr int kShades = 4;  // of a batch, besides none of it
+  out.any = false;
+  out.constant = {};
   for (std::size_t b = 0; b < batches_.size(); ++b) {
-    Uniforms::Part& part = out.parts[b];
-    part.count = fill_batch(batches_[b], light, frames, sheets, normalisation, part.data);
-    any = any || part.count > 0;
+    const Batch& batch = batches_[b];
+    const double share = static_cast<double>(frames.weight(batch.role)) / normalisation;
+    const int needed = fill_batch(b, light, frames, sheets, share, out);
+    const int step = (batch.count() + kShades - 1) / kShades;
+    out.counts[b] =
+        lookups_ ? batch.count() : std::min(batch.count(), (needed + step - 1) / step * step);
+    out.any = out.any || needed > 0;
   }
-  return any;
 }
 
-// Groups with a weight come first; the shader stops after them.
-int PlanePass::fill_batch(const Batch& batch, const FoldedLight& light, const FrameSlots& frames,
-                          const PlaneSheets& sheets, double normalisation,
-                          std::vector<float>& data) const {
-  const double share = static_cast<double>(frames.weight(batch.role)) / normalisation;
-  if (share == 0) return 0;
-  const int slot_of_frame = frames.slot(batch.role);
-  auto weighs = [&](int plane) {
-    const auto k = static_cast<std::size_t>(plane);
-    return plane >= 0 && !is_zero(light.weights[k]) && sheets.state(k, slot_of_frame).present;
-  };
-  auto out = data.begin();
-  auto put = [&](const std::array<float, 4>& v) { out = std::copy(v.begin(), v.end(), out); };
-  int count = 0;
-  for (const Group& group : batch.groups) {
-    if (std::none_of(group.planes.begin(), group.planes.end(), weighs)) continue;
-    ++count;
-    const auto lead = static_cast<std::size_t>(group.planes[0]);
-    int reference = 0;
-    for (const int plane : group.planes)
-      if (plane >= 0)
-        reference = std::max(
-            reference,
-            sheets.state(static_cast<std::size_t>(plane), slot_of_frame).exponent_reference);
-    for (int i = 0; i < batch.planes_per_group; ++i) {
-      const int plane = group.planes[static_cast<std::size_t>(i)];
-      const std::size_t at = plane >= 0 ? static_cast<std::size_t>(plane) : lead;
-      put(sheets.coordinates(sheets.mantissa(at)));
-      std::array<float, 4> weight{};
-      if (weighs(plane)) {
-        const double factor = sheets.state(at, slot_of_frame).factor * share;
-        for (std::size_t c = 0; c < 3; ++c)
-          weight[c] = static_cast<float>(static_cast<double>(light.weights[at][c]) * factor);
+// Returns up to which group there is a weight.
+int PlanePass::fill_batch(std::size_t index, const FoldedLight& light, const FrameSlots& frames,
+                          const PlaneSheets& sheets, double share, Weights& weights) const {
+  const Batch& batch = batches_[index];
+  const int slot = frames.slot(batch.role);
+  // A raw sample is (mantissa + 1) · mantissa zero / 255.
+  const bool raw = is_raw(batch);
+  const double scale = !raw ? 1 : batch.wide ? 255.0 / 512 : 255.0 / 128;
+  int needed = 0;
+  auto out = weights.data[index].begin();
+  for (int g = 0; g < batch.count(); ++g) {
+    const Group& group = batch.groups[static_cast<std::size_t>(g)];
+    const auto first = out;
+    // Of a group without a weight: 2^(E - 255) is at most 1, and never an infinity that 0 would not
+    // cancel.
+    int reference = 255;
+    bool any = false;
+    for (int i = 0; i < batch.planes_per_group; ++i, out += 4) {
+      const std::size_t k = plane_of(group, i);
+      const PlaneSheets::PlaneState& state = sheets.state(k, slot);
+      std::fill_n(out, 4, 0.0f);
+      if (group.planes[static_cast<std::size_t>(i)] < 0 || is_zero(light.weights[k]) ||
+          !state.present || share == 0)
+        continue;
+      reference = any ? std::max(reference, state.exponent_reference) : state.exponent_reference;
+      any = true;
+      for (std::size_t c = 0; c < 3; ++c) {
+        const double weight = static_cast<double>(light.weights[k][c]) * state.factor * share;
+        out[static_cast<std::ptrdiff_t>(c)] = static_cast<float>(weight * scale);
+        if (raw) weights.constant[c] -= weight;
       }
-      if (i == 0) weight[3] = static_cast<float>(reference);
-      put(weight);
     }
-    if (batch.exponent_sheet >= 0) put(sheets.coordinates(sheets.exponent(lead)));
+    first[3] = static_cast<float>(reference);
+    if (any) needed = g + 1;
   }
-  return count;
+  return needed;
 }
 
 PlanePass::Locations PlanePass::locate(const Functions& gl, const Program& program,
                                        int (*unit_of)(int)) const {
   Locations at;
   for (std::size_t b = 0; b < batches_.size(); ++b)
-    at.parts.push_back(
-        {gl.GetUniformLocation(program.name(), ("u_batch" + std::to_string(b)).c_str()),
-         gl.GetUniformLocation(program.name(), ("u_count" + std::to_string(b)).c_str())});
+    at.push_back(gl.GetUniformLocation(program.name(), ("u_weight" + std::to_string(b)).c_str()));
   for (int i = 0; i < unit_count(); ++i)
     gl.Uniform1i(gl.GetUniformLocation(program.name(), ("u_sheet" + std::to_string(i)).c_str()),
                  unit_of(i));
   return at;
 }
 
-void PlanePass::set_uniforms(const Functions& gl, const Locations& at,
-                             const Uniforms& uniforms) const {
-  for (std::size_t b = 0; b < batches_.size(); ++b) {
-    const Uniforms::Part& part = uniforms.parts[b];
-    gl.Uniform1i(at.parts[b].count, part.count);
-    if (part.count > 0)
-      gl.Uniform4fv(at.parts[b].data, part.count * batches_[b].stride(), part.data.data());
-  }
+void PlanePass::set_weights(const Functions& gl, const Locations& at,
+                            const Weights& weights) const {
+  for (std::size_t b = 0; b < batches_.size(); ++b)
+    if (weights.counts[b] > 0)
+      gl.Uniform4fv(at[b], weights.counts[b] * batches_[b].planes_per_group,
+                    weights.data[b].data());
 }
 
 void PlanePass::bind(const Functions& gl, const FrameSlots& frames, const PlaneSheets& sheets,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <bit>
+#include <cstdio>
 
 #include "gles/plane_pass.hpp"
 #include "gles/shaders.hpp"
@@ -8,13 +9,29 @@
 namespace relit::gles {
 namespace {
 
-constexpr const char* kBatchNames[] = {"BATCH_DATA",     "BATCH_COUNT",    "BATCH_SUM",
-                                       "BATCH_GROUPS",   "BATCH_STRIDE",   "BATCH_PLANES",
-                                       "BATCH_MANTISSA", "BATCH_SHEET_0",  "BATCH_SHEET_1",
-                                       "BATCH_SHEET_2",  "BATCH_EXPONENTS"};
+constexpr const char* kBatchNames[] = {"BATCH_WEIGHTS",  "BATCH_PLANES",  "BATCH_MANTISSA",
+                                       "BATCH_SHEET_0",  "BATCH_SHEET_1", "BATCH_SHEET_2",
+                                       "BATCH_EXPONENTS"};
 
 std::string define(const std::string& name, const std::string& value) {
   return "#define " + name + " " + value + "\n";
+}
+
+std::string undefine(const std::string& name) { return "#undef " + name + "\n"; }
+
+std::string channel_names(unsigned channels) {
+  std::string names;
+  for (unsigned c = 0; c < 3; ++c)
+    if ((channels >> c & 1u) != 0) names += "rgb"[c];
+  return names.empty() ? "r" : names;
+}
+
+// Ten digits tell any two floats apart.
+std::string vector_of(const std::array<float, 4>& v) {
+  char text[96];
+  std::snprintf(text, sizeof text, "vec4(%.9e, %.9e, %.9e, %.9e)", static_cast<double>(v[0]),
+                static_cast<double>(v[1]), static_cast<double>(v[2]), static_cast<double>(v[3]));
+  return text;
 }
 
 }  // namespace
@@ -29,65 +46,89 @@ std::string PlanePass::samplers() const {
   for (int unit = 0; unit < unit_count(); ++unit)
     text += "uniform sampler2D u_sheet" + std::to_string(unit) + ";\n";
   if constexpr (std::endian::native == std::endian::big) text += define("BIG_ENDIAN", "1");
-  return text;
+  return text + std::string(shaders::composite_head);
 }
 
-std::string PlanePass::batch_text(std::size_t index) const {
+std::string PlanePass::batch_text(std::size_t index, int groups) const {
   const Batch& batch = batches_[index];
+  const std::string weights = "u_weight" + std::to_string(index);
   std::string text = define("BATCH_PLANES", std::to_string(batch.planes_per_group));
-  text += define("BATCH_MANTISSA", batch.wide ? "mantissa10" : "mantissa8");
+  text += define("BATCH_WEIGHTS", weights);
+  text += define("BATCH_MANTISSA",
+                 std::string(is_raw(batch) ? "raw" : "mantissa") + (batch.wide ? "10" : "8"));
   for (int i = 0; i < batch.planes_per_group; ++i)
     text += define("BATCH_SHEET_" + std::to_string(i),
                    sheet_name(batch.sheets[static_cast<std::size_t>(i)]));
   if (batch.exponent_sheet >= 0)
     text += define("BATCH_EXPONENTS", sheet_name(batch.exponent_sheet));
-  return text;
+  return text + "uniform vec4 " + weights + "[" + std::to_string(groups * batch.planes_per_group) +
+         "];\n";
 }
 
-std::string PlanePass::text(PlaneTaps taps) const {
+std::string PlanePass::place_text(const Group& group, const Batch& batch, int lookup,
+                                  const PlaneSheets& sheets) {
+  const bool exponent = lookup == batch.planes_per_group;
+  const std::size_t k = plane_of(group, exponent ? 0 : lookup);
+  return vector_of(sheets.coordinates(exponent ? sheets.exponent(k) : sheets.mantissa(k)));
+}
+
+std::string PlanePass::text(PlaneTaps taps, std::span<const int> counts,
+                            const PlaneSheets& sheets) const {
   std::string text = samplers();
   if (taps == PlaneTaps::kFour) text += define("FOUR_TAPS", "1");
-  text += shaders::composite_head;
   text += shaders::composite_taps;
   std::string sums;
   for (std::size_t b = 0; b < batches_.size(); ++b) {
-    const std::string index = std::to_string(b);
-    text += batch_text(b);
-    text += define("BATCH_DATA", "u_batch" + index);
-    text += define("BATCH_COUNT", "u_count" + index);
-    text += define("BATCH_SUM", "sum" + index);
-    text += define("BATCH_GROUPS", std::to_string(batches_[b].groups.size()));
-    text += define("BATCH_STRIDE", std::to_string(batches_[b].stride()));
-    text += shaders::composite_loop;
-    for (const char* name : kBatchNames) text += std::string("#undef ") + name + "\n";
-    sums += " + sum" + index + "()";
+    const Batch& batch = batches_[b];
+    if (counts[b] == 0) continue;
+    const std::string name = "sum" + std::to_string(b) + "()";
+    text += batch_text(b, counts[b]);
+    text += "vec3 " + name + " {\n  vec3 sum = vec3(0.0);\n  vec2 low, high;\n";
+    for (int g = 0; g < counts[b]; ++g) {
+      std::string names = define("GROUP", std::to_string(g)), after = undefine("GROUP");
+      for (int i = 0; i < batch.lookups(); ++i) {
+        const std::string place =
+            i == batch.planes_per_group ? "PLACE_E" : "PLACE_" + std::to_string(i);
+        names +=
+            define(place, place_text(batch.groups[static_cast<std::size_t>(g)], batch, i, sheets));
+        after += undefine(place);
+      }
+      for (std::size_t i = 0; i < 3; ++i) {
+        const std::string channels = "CHANNELS_" + std::to_string(i);
+        names +=
+            define(channels, channel_names(batch.groups[static_cast<std::size_t>(g)].channels[i]));
+        after += undefine(channels);
+      }
+      text += names + std::string(shaders::composite_group) + after;
+    }
+    text += "  return sum;\n}\n";
+    for (const char* each : kBatchNames) text += undefine(each);
+    sums += " + " + name;
   }
   return text + "vec3 plane_sum() { return u_constant" + sums + "; }\n";
 }
 
-std::string PlanePass::unrolled_uniforms() const {
-  std::string text(shaders::composite_head);
+PlanePass::LookupText PlanePass::lookup_text(const PlaneSheets& sheets) const {
+  LookupText text;
+  text.uniforms = samplers();
   if (batches_.empty()) return text;
   const Batch& batch = batches_.front();
-  const std::size_t weights =
-      batch.groups.size() * static_cast<std::size_t>(batch.planes_per_group);
-  return text + "uniform vec4 u_weight[" + std::to_string(weights) + "];\n" + batch_text(0);
-}
-
-std::string PlanePass::unrolled_statements() const {
-  std::string text;
+  text.uniforms += batch_text(0, batch.count());
   std::size_t varying = 0;
-  for (int g = 0; g < group_count(); ++g) {
-    text += define("GROUP", std::to_string(g));
-    std::string undefine = "#undef GROUP\n";
-    for (int i = 0; i < lookups_per_group(); ++i) {
+  for (int g = 0; g < batch.count(); ++g) {
+    std::string names = define("GROUP", std::to_string(g)), after = undefine("GROUP");
+    for (int i = 0; i < batch.lookups(); ++i) {
+      const std::string v = "v" + std::to_string(varying++);
       const std::string name =
-          "GROUP_UV_" + (i < planes_per_group() ? std::to_string(i) : std::string("E"));
-      text += define(name, "v" + std::to_string(varying++));
-      undefine += "#undef " + name + "\n";
+          i == batch.planes_per_group ? "GROUP_UV_E" : "GROUP_UV_" + std::to_string(i);
+      const std::string place =
+          place_text(batch.groups[static_cast<std::size_t>(g)], batch, i, sheets);
+      text.varyings += "VARYING vec2 " + v + ";\n";
+      text.assignments += "  " + v + " = " + place + ".xy + texel * " + place + ".zw;\n";
+      names += define(name, v);
+      after += undefine(name);
     }
-    text += shaders::composite_unrolled;
-    text += undefine;
+    text.statements += names + std::string(shaders::composite_unrolled) + after;
   }
   return text;
 }

@@ -49,6 +49,7 @@ class PlaneSheets {
     return states_[static_cast<std::size_t>(slot)][plane];
   }
   [[nodiscard]] int slot_count() const { return slot_count_; }
+  [[nodiscard]] unsigned channels(std::size_t plane) const { return planes_[plane].channels; }
   [[nodiscard]] std::size_t plane_count() const { return planes_.size(); }
   [[nodiscard]] int sheet_count() const { return static_cast<int>(sheets_.size()); }
   /// (offset.xy, scale.xy) such that offset + scale × texel is the place's texture coordinate for

@@ -45,9 +45,10 @@ bool PathChooser::wants_measuring(double covered_pixels) {
 }
 
 void PathChooser::take(const std::array<double, kCompositePaths>& cost_s) {
+  for (std::size_t i = 0; i < cost_s.size(); ++i)
+    cost_s_[i] = available_[i] && is_cost(cost_s[i]) ? cost_s[i] : 0;
   CompositePath cheapest = path_;
   for (std::size_t i = 0; i < cost_s.size(); ++i) {
-    cost_s_[i] = available_[i] && is_cost(cost_s[i]) ? cost_s[i] : 0;
     if (cost_s_[i] <= 0) continue;
     const double best = cost_s_[index(cheapest)];
     if (best <= 0 || cost_s_[i] < best) cheapest = static_cast<CompositePath>(i);

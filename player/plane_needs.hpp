@@ -14,7 +14,9 @@ namespace relit::player {
 struct RelightQuality {
   int planes = -1;  ///< only the first so many, in the model's order of importance; -1: all
   /// Composites every second texel of every second row, filtered as ever: a quarter of the work.
-  /// (Where the sum is fused into the meshes' shader there is no light map to make smaller.)
+  /// (On the mannequin that is 31 to 34 dB from the full map, 0.3 to 0.6 dB more than means of four
+  /// texels would give for all of the work. Where the sum is fused into the meshes' shader there is
+  /// no light map to make smaller.)
   bool half_size = false;
   bool operator==(const RelightQuality&) const = default;
 };

@@ -16,6 +16,8 @@ gles::PlaneDescription describe(const container::LayerRecord& layer,
   out.mantissa_shift = layer.chroma == container::Chroma::k420 && plane.component > 0 ? 1 : 0;
   out.mantissa = {3 * layer_number + plane.component, plane.mantissa_rect.x >> out.mantissa_shift,
                   plane.mantissa_rect.y >> out.mantissa_shift};
+  out.channels = 0;
+  for (const container::MatrixEntry& entry : plane.matrix) out.channels |= 1u << entry.channel;
   out.has_exponent = layer.has_exponents;
   if (layer.has_exponents) {
     out.exponent_shift = std::countr_zero(static_cast<unsigned>(layer.exponent_block));

@@ -21,7 +21,7 @@ int main(int argc, char** argv) {
     const char* name;
     Command run;
   };
-  const std::array<Entry, 12> commands{{{"info", add_info(app)},
+  const std::array<Entry, 13> commands{{{"info", add_info(app)},
                                         {"plan", add_plan(app)},
                                         {"dump", add_dump(app)},
                                         {"light", add_light(app)},

@@ -226,6 +226,34 @@ TEST_CASE("a light map of half size is every second texel of the full one", "[gl
   }
 }
 
+TEST_CASE("planes of one channel are added to that channel", "[gles][es2]") {
+  for (const int exponent_shift : {-1, 2}) {
+    Scene scene({"one channel", 32, 24, 9, 8, false, exponent_shift});
+    for (std::size_t k = 0; k < scene.weights_.size(); ++k) {
+      Rgb weight{};
+      weight[k % 3] = scene.weights_[k][k % 3];
+      scene.weights_[k] = weight;
+      scene.description_.planes[k].channels = 1u << k % 3;
+    }
+    const Scene::Reference reference = scene.reference();
+    on_each_backend([&](const Device& device, const Backend&) {
+      auto compositor = Compositor::create(device, scene.description_);
+      if (!compositor) FAIL(compositor.error().message);
+      REQUIRE((*compositor)->upload(scene.views_));
+      REQUIRE((*compositor)->composite(scene.light_));
+      std::vector<float> values(reference.values.size());
+      REQUIRE((*compositor)->read_back(values));
+      CHECK(largest_difference(values, reference.values) <=
+            bound(device, (*compositor)->pass_count(), reference, scene.views_.size()));
+      std::vector<Rgb> weights = scene.weights_;
+      weights[1][0] = 0.1f;
+      FoldedLight light = scene.light_;
+      light.weights = weights;
+      CHECK((*compositor)->composite(light).error().code == ErrorCode::kInvalid);
+    });
+  }
+}
+
 TEST_CASE("planes are added to a frame that is already there", "[gles][es2]") {
   const Scene scene({"added", 32, 32, 6, 8, true, 0});
   const Scene::Reference reference = scene.reference();
