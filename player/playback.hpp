@@ -186,7 +186,9 @@ class Playback {
     Int scale = 1;  ///< units in 2^-32 ns
     Int end = 0;    ///< of the last item
     bool loop = false;
-    [[nodiscard]] bool is_clip() const { return items.size() == 1 && items[0].repeats == 1; }
+    [[nodiscard]] bool is_clip() const {
+      return items.size() == 1 && items[0].repeats == 1 && items[0].fade == 0;
+    }
   };
   /// A clip that play_clip() is blending over from, in units of its own.
   struct Outgoing {

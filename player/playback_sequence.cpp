@@ -172,7 +172,7 @@ Result<Playback::Program> Playback::schedule(std::span<const SequenceItem> items
     next.tick = kSecondUnits * clip.tick_rate.den;
     if (exact) next.tick *= program.scale / num;
     next.factor = exact ? Int{1} : num;
-    // Neither factor is beyond 2^64, and their product may be: 2^32 ticks · 2^32 repeats.
+    // At most 2^32 ticks · 2^32 repeats, which fits; in the program's units it may not.
     const Int ticks = static_cast<Int>(clip.duration_ticks) * item.repeats;
     const Int longest = kLongestSequence * program.scale;
     if (ticks > longest * next.factor / next.tick) {

@@ -103,6 +103,20 @@ TEST_CASE("a sequence that goes round blends its last item into its first") {
   CHECK(playback.at(100 * kSecond).ended);
 }
 
+TEST_CASE("a clip can go round by blending into itself") {
+  Playback playback = walker();
+  const std::vector<SequenceItem> items{{kTurn, 1, 0.4}};
+  REQUIRE(playback.play_sequence(items, true));
+  CHECK(playback.duration_s() == Approx(1.6).epsilon(1e-15));
+  const Moment moment = playback.at(1700 * kMillisecond);
+  CHECK(moment.primary.frame == 2);
+  REQUIRE(moment.secondary);
+  CHECK(moment.secondary->frame == 42);
+  CHECK(moment.secondary_weight == Approx(0.75).epsilon(1e-15));
+  REQUIRE(playback.step(38));  // of the 40 that are its own
+  CHECK(playback.now().primary.frame == 0);
+}
+
 TEST_CASE("never more than two clips are seen, however long the fades") {
   Playback playback = walker();
   const std::vector<SequenceItem> items{{kWalk, 1, 1e9}, {kTurn, 1, 1e9}, {kWalk, 1, 1e9}};
