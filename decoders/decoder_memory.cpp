@@ -13,28 +13,9 @@ struct Size {
   [[nodiscard]] Bytes area() const { return width * height; }
 };
 
-Bytes aligned(Bytes value, Bytes step) { return (value + step - 1) / step * step; }
-
 Size size_of(const VideoFormat& format) {
   return {static_cast<Bytes>(std::max(format.width, 1)),
           static_cast<Bytes>(std::max(format.height, 1))};
-}
-
-/// avcodec_align_dimensions2(): whole macroblock pairs, rows of every plane on cache lines, and two
-/// rows for H.264's chroma filter.
-Bytes padded_picture(const VideoFormat& format) {
-  constexpr Bytes kLine = 64;
-  constexpr Bytes kBehindPlanes = 3 * 2 * kLine;
-  const bool halved = format.chroma == container::Chroma::k420 ||
-                      (format.chroma == container::Chroma::kLuma &&
-                       (format.codec == "h264" || format.codec == "vp9"));
-  const bool coloured = halved || format.chroma == container::Chroma::k444;
-  const Bytes sample = format.bit_depth > 8 ? 2 : 1;
-  const Size size = size_of(format);
-  const Bytes row = aligned(aligned(size.width, 16) * sample, halved ? 2 * kLine : kLine);
-  const Bytes rows = aligned(size.height, 32) + (format.codec == "h264" ? 2 : 0);
-  const Bytes luma = row * rows;
-  return luma + (halved ? luma / 2 : coloured ? 2 * luma : 0) + kBehindPlanes;
 }
 
 /// libavcodec/h264_slice.c: the context with its parameter sets; scratch rows; tables by macroblock
@@ -89,7 +70,6 @@ DecoderMemory decoder_memory(const VideoFormat& format, int pictures, int thread
   const bool late = format.codec == "hevc" || format.codec == "ffv1";
   memory.pictures = static_cast<Bytes>(std::max(pictures, 1)) + (late ? 1 : 0);
   if (t > 1 && format.codec != "ffv1") memory.pictures += late ? t : t + 1;
-  memory.picture_bytes = padded_picture(format);
   if (format.codec == "h264") {
     memory.context_bytes = h264(format, memory.pictures, t);
   } else if (format.codec == "mpeg4") {

@@ -12,9 +12,8 @@ struct DecoderMemory {
   /// Opened and in the middle of a stream, without the samples of its pictures: libavcodec's
   /// context, its tables by picture size, and what it keeps beside each picture that it refers to.
   std::uint64_t context_bytes = 0;
-  /// The samples of one picture as the decoder allocates it, rows and columns padded.
-  std::uint64_t picture_bytes = 0;
-  /// How many of them it holds at once, beside those that were taken from it.
+  /// How many pictures of picture_buffer_bytes() it holds at once, beside those that were taken
+  /// from it.
   std::uint64_t pictures = 0;
 };
 

@@ -25,13 +25,24 @@ Result<PlaneSheets> PlaneSheets::create(const Device& device,
                                         const PlaneSetDescription& description) {
   PlaneSheets sheets;
   sheets.device_ = &device;
-  sheets.slot_count_ = description.changes_every_frame ? 2 : 1;
-  RELIT_TRY(sheets.describe(description));
-  const int limit = std::min(kSheetSide, device.caps().max_texture_size);
-  sheets.make_regions(description, limit);
-  RELIT_TRY(sheets.pack(limit));
+  RELIT_TRY(sheets.lay_out(description, device.caps().max_texture_size));
   sheets.make_textures();
   return sheets;
+}
+
+Result<PlaneSheets::Bytes> PlaneSheets::measure(const PlaneSetDescription& description,
+                                                int max_texture_size) {
+  PlaneSheets sheets;
+  RELIT_TRY(sheets.lay_out(description, max_texture_size));
+  return Bytes{sheets.gpu_bytes(), sheets.largest_region_bytes()};
+}
+
+Status PlaneSheets::lay_out(const PlaneSetDescription& description, int max_texture_size) {
+  slot_count_ = description.changes_every_frame ? 2 : 1;
+  RELIT_TRY(describe(description));
+  const int limit = std::min(kSheetSide, max_texture_size);
+  make_regions(description, limit);
+  return pack(limit);
 }
 
 Status PlaneSheets::describe(const PlaneSetDescription& d) {
@@ -220,11 +231,7 @@ void PlaneSheets::make_textures() {
       sheet.textures[static_cast<std::size_t>(i)] =
           make_texture(*device_, format, sheet.width, sheet.height);
   }
-  std::size_t largest = 0;
   for (const Region& region : regions_) {
-    largest =
-        std::max(largest, static_cast<std::size_t>(region.width) *
-                              static_cast<std::size_t>(region.height) * (region.wide ? 2 : 1));
     for (const std::uint32_t t : region.tiles) {
       const Tile& tile = tiles_[t];
       for (const std::uint32_t plane : tile.planes) {
@@ -236,7 +243,17 @@ void PlaneSheets::make_textures() {
     }
   }
   // Rows of a picture are longer than the region's. Without a row length they are copied together.
-  staging_.resize(largest);
+  staging_.resize(largest_region_bytes());
+}
+
+std::size_t PlaneSheets::largest_region_bytes() const {
+  std::size_t largest = 0;
+  for (const Region& region : regions_) {
+    largest =
+        std::max(largest, static_cast<std::size_t>(region.width) *
+                              static_cast<std::size_t>(region.height) * (region.wide ? 2 : 1));
+  }
+  return largest;
 }
 
 Status PlaneSheets::upload(std::span<const PlaneView> planes, int slot,

@@ -37,6 +37,14 @@ class PlaneSheets {
   /// a texture may be.
   static Result<PlaneSheets> create(const Device& device, const PlaneSetDescription& description);
 
+  /// What create() would take, for the memory plan: gpu_bytes() and cpu_bytes() of sheets on a
+  /// device whose textures may have `max_texture_size` texels a side. Errors: as create().
+  struct Bytes {
+    std::size_t gpu = 0;
+    std::size_t cpu = 0;
+  };
+  static Result<Bytes> measure(const PlaneSetDescription& description, int max_texture_size);
+
   /// Uploads the planes whose mantissa view is not empty and whose entry in `wanted` is not 0
   /// (empty: all are wanted); see Compositor::upload(). What the slot held is forgotten unless
   /// `keep`, by which planes of the same frame are added to it. Errors: kInvalid.
@@ -84,6 +92,8 @@ class PlaneSheets {
     std::array<Texture, 2> textures;
   };
 
+  Status lay_out(const PlaneSetDescription& description, int max_texture_size);
+  [[nodiscard]] std::size_t largest_region_bytes() const;
   Status describe(const PlaneSetDescription& description);
   void add_tile(const PlaneSetDescription& description, std::size_t plane, bool exponent);
   void make_regions(const PlaneSetDescription& description, int limit);

@@ -8,6 +8,7 @@
 #include "decoders/decoder_memory.hpp"
 #include "decoders/image.hpp"
 #include "decoders/plane_decoder.hpp"
+#include "player/relighter.hpp"
 #include "player/video_tracks.hpp"
 
 namespace relit::player {
@@ -129,6 +130,11 @@ std::uint64_t light_map_texel_bytes(gles::LightMapFormat format) {
   return format == gles::LightMapFormat::kFloat ? 16 : 8;
 }
 
+/// gles::Compositor looks at 256 samples of every plane of two frames to find a square root's peak.
+std::uint64_t sample_bytes(gles::LightMapFormat format, std::uint64_t planes) {
+  return format == gles::LightMapFormat::kSquareRoot8 ? 2 * planes * 256 * sizeof(float) : 0;
+}
+
 /// gles::Framebuffer::gpu_bytes() of a context with four samples a pixel.
 std::uint64_t framebuffer_bytes(const DrawingScale& drawing) {
   const std::uint64_t pixels = static_cast<std::uint64_t>(drawing.framebuffer_width) *
@@ -163,7 +169,10 @@ Result<MemoryAccount> MemoryAccount::create(const FileContents& contents,
   }
   account.measure_layers();
   account.measure_poses();
-  if (account.drawn()) account.measure_images();
+  if (account.drawn()) {
+    account.measure_images();
+    account.measure_sheets();
+  }
   return account;
 }
 
@@ -190,11 +199,19 @@ Status MemoryAccount::find_records(const FileContents& contents) {
 
 void MemoryAccount::measure_layers() {
   std::uint64_t plain_frame = 0;
+  const auto add = [](Layer& layer, const decoders::VideoFormat& format, int pictures,
+                      bool mantissas) {
+    // What no decoder here takes is refused when it is opened.
+    const auto padded = decoders::picture_buffer_bytes(format);
+    const std::uint64_t plain =
+        decoders::picture_bytes(format.width, format.height, format.chroma, format.bit_depth);
+    layer.tracks.push_back({format, pictures, padded ? *padded : plain, mantissas});
+  };
   for (Layer& layer : layers_) {
     const LayerRecord& record = *layer.record;
-    layer.tracks.push_back({decoders::mantissa_format(record), record.mantissa_pictures, true});
+    add(layer, decoders::mantissa_format(record), record.mantissa_pictures, true);
     if (record.has_exponents) {
-      layer.tracks.push_back({decoders::exponent_format(record), record.exponent_pictures, false});
+      add(layer, decoders::exponent_format(record), record.exponent_pictures, false);
     }
     for (const Track& track : layer.tracks) {
       const decoders::VideoFormat& f = track.format;
@@ -265,12 +282,21 @@ void MemoryAccount::measure_images() {
   }
 }
 
+// The compositor makes room for the planes of all layers, also those that are never decoded.
+void MemoryAccount::measure_sheets() {
+  const std::vector<LayerRecord> layers = contents_->layers_of(model_->id);
+  const gles::PlaneSetDescription description = describe_planes(*model_, layers);
+  plane_count_ = description.planes.size();
+  const auto measured = gles::PlaneSheets::measure(description, wishes_.drawing->max_texture_size);
+  // What does not fit into textures is composited on the CPU.
+  sheets_possible_ = measured.has_value();
+  if (measured) sheets_ = *measured;
+}
+
 std::uint64_t MemoryAccount::frame_bytes(std::size_t layers) const {
   std::uint64_t sum = pose_frame_bytes_;
   for (std::size_t l = 0; l < std::min(layers, layers_.size()); ++l) {
-    for (const Track& track : layers_[l].tracks) {
-      sum += decoders::decoder_memory(track.format, track.pictures, 1).picture_bytes;
-    }
+    for (const Track& track : layers_[l].tracks) sum += track.picture_bytes;
   }
   return sum;
 }
@@ -313,7 +339,7 @@ void MemoryAccount::add_decoding(std::vector<MemoryTerm>& terms, const MemoryCho
           decoders::decoder_memory(track.format, track.pictures, track.mantissas ? threads : 1);
       ++streams;
       contexts += memory.context_bytes;
-      references += memory.picture_bytes * (memory.pictures + kFramesAhead);
+      references += track.picture_bytes * (memory.pictures + kFramesAhead);
     }
   }
   const std::uint64_t segments = segments_held(choice.ring_frames);
@@ -333,15 +359,38 @@ void MemoryAccount::add_decoding(std::vector<MemoryTerm>& terms, const MemoryCho
                    pose_fixed_bytes_ + segments * pose_segment_bytes_});
 }
 
+// Relighter's buffers. Where the governor halves the light map it makes a second one of a quarter
+// of the texels.
 void MemoryAccount::add_composite(std::vector<MemoryTerm>& terms,
                                   const MemoryChoice& choice) const {
-  const std::uint64_t texels = std::uint64_t{model_->width} * model_->height;
+  const auto half = [](std::uint64_t side) { return (side + 1) / 2; };
+  const std::uint64_t full = std::uint64_t{model_->width} * model_->height;
+  const std::uint64_t quarter = half(model_->width) * half(model_->height);
   const std::uint64_t texel = light_map_texel_bytes(choice.light_map);
   const bool any = choice.path == CompositePath::kAuto;
-  if (any || choice.path == CompositePath::kCpu || !drawn()) {
-    const std::uint64_t staged = drawn() ? texels * texel : 0;
+  const bool on_cpu = any || choice.path == CompositePath::kCpu || !drawn() || !sheets_possible_;
+  const bool on_gpu = choice.path != CompositePath::kCpu && drawn() && sheets_possible_;
+  std::uint64_t spare_heap = 0, spare_gpu = 0;
+  if (on_cpu) {
     terms.push_back({"cpu composite", "the light map as floats, and as it is uploaded",
-                     texels * 3 * sizeof(float) + staged, drawn() ? 2 * texels * texel : 0});
+                     full * 3 * sizeof(float) + (drawn() ? full * texel : 0),
+                     drawn() ? 2 * full * texel : 0});
+    spare_heap += quarter * texel;
+    spare_gpu += 2 * quarter * texel;
+  }
+  if (on_gpu) {
+    terms.push_back({"plane textures", "planes as they were decoded, of two frames",
+                     sheets_.cpu + sample_bytes(choice.light_map, plane_count_), sheets_.gpu});
+    terms.push_back({"light map", "the texture that is composited into", 0, full * texel});
+    spare_gpu += quarter * texel;
+    // Square roots of two frames do not add up: each gets a map of its own, and a third joins them.
+    if (choice.light_map == gles::LightMapFormat::kSquareRoot8) {
+      spare_gpu += 2 * (full + quarter) * texel;
+    }
+  }
+  if (drawn()) {
+    terms.push_back({"light map at half size", "for when playback is behind, and for blends",
+                     spare_heap, spare_gpu});
   }
 }
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "decoders/video_decoder.hpp"
+#include "gles/plane_sheets.hpp"
 #include "player/memory_plan.hpp"
 
 /// The terms of a memory plan for one choice of what is negotiable.
@@ -46,7 +47,8 @@ class MemoryAccount {
   MemoryAccount() = default;
   struct Track {
     decoders::VideoFormat format;
-    int pictures = 1;        ///< by the file
+    int pictures = 1;  ///< by the file
+    std::uint64_t picture_bytes = 0;
     bool mantissas = false;  ///< the others are decoded on one thread
   };
   struct Layer {
@@ -58,6 +60,7 @@ class MemoryAccount {
   void measure_images();
   void measure_layers();
   void measure_poses();
+  void measure_sheets();
 
   void add_file(std::vector<MemoryTerm>& terms) const;
   void add_decoding(std::vector<MemoryTerm>& terms, const MemoryChoice& choice) const;
@@ -78,6 +81,9 @@ class MemoryAccount {
   std::uint64_t images_decoded_bytes_ = 0;
   std::uint64_t images_working_bytes_ = 0;
   std::uint64_t images_gpu_bytes_ = 0;
+  gles::PlaneSheets::Bytes sheets_;  ///< of the planes of all layers
+  std::uint64_t plane_count_ = 0;
+  bool sheets_possible_ = false;
 };
 
 }  // namespace relit::player

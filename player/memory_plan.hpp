@@ -28,6 +28,7 @@ struct SegmentScale {
 
 /// The picture that the character is drawn into, and what is behind it.
 struct DrawingScale {
+  int max_texture_size = 4096;
   int framebuffer_width = 0;  ///< 0: the host's own, which counts as nothing here
   int framebuffer_height = 0;
   int samples = 1;          ///< gles::FramebufferOptions::samples

@@ -28,6 +28,18 @@ gles::PlaneDescription describe(const container::LayerRecord& layer,
 
 }  // namespace
 
+gles::PlaneSetDescription describe_planes(const container::ModelRecord& model,
+                                          std::span<const container::LayerRecord> layers) {
+  gles::PlaneSetDescription description;
+  description.width = model.width, description.height = model.height;
+  for (std::size_t l = 0; l < layers.size(); ++l) {
+    for (const container::PlaneRecord& plane : layers[l].planes) {
+      description.planes.push_back(describe(layers[l], plane, static_cast<int>(l)));
+    }
+  }
+  return description;
+}
+
 Result<std::unique_ptr<Relighter>> Relighter::create(const container::ModelRecord& model,
                                                      std::span<const container::LayerRecord> layers,
                                                      const RelightOptions& options) {
@@ -90,14 +102,8 @@ Status Relighter::prepare_uploader(std::size_t half) {
 
 Status Relighter::prepare_gpu() {
   if (compositor_) return {};
-  gles::PlaneSetDescription description;
-  description.width = model_->width, description.height = model_->height;
+  gles::PlaneSetDescription description = describe_planes(*model_, layers_);
   description.format = options_.format;
-  for (std::size_t l = 0; l < layers_.size(); ++l) {
-    for (const container::PlaneRecord& plane : layers_[l].planes) {
-      description.planes.push_back(describe(layers_[l], plane, static_cast<int>(l)));
-    }
-  }
   RELIT_ASSIGN(compositor_, gles::Compositor::create(*options_.device, description));
   for (FrameKey& slot : slots_) slot = {};
   return {};

@@ -34,6 +34,10 @@ struct RelightOptions {
   gles::LightMapFormat format = gles::LightMapFormat::kAuto;
 };
 
+/// The planes of a model as the compositor sees them.
+[[nodiscard]] gles::PlaneSetDescription describe_planes(
+    const container::ModelRecord& model, std::span<const container::LayerRecord> layers);
+
 struct RelightStats {
   std::uint64_t composites = 0;       ///< light maps made, or fused sums set up
   std::uint64_t skipped = 0;          ///< calls of composite() that found nothing changed
