@@ -140,17 +140,18 @@ typedef enum relit_path {
 
 typedef struct relit_open_options {
   size_t struct_size;
-  relit_pool* pool;     ///< NULL (default): one of its own
-  const char* clip;     ///< by name, or by its number from 0; NULL (default): the first
-  int32_t model;        ///< number among the clip's appearance models; default 0
-  int32_t layers;       ///< only the first so many, faster and less accurate; -1 (default): all
-  int32_t threads;      ///< of the pool of its own; 0 (default): one a processor
+  relit_pool* pool;  ///< NULL (default): one of its own
+  const char* clip;  ///< by name, or by its number from 0; NULL (default): the first
+  int32_t model;     ///< among the clip's appearance models; 0, as files of this version have one
+  int32_t layers;    ///< only the first so many, faster and less accurate; -1 (default): all
+  int32_t threads;   ///< of the pool of its own; 0 (default): one a processor
   int32_t interpolate;  ///< 1 (default): light maps and poses are blended between frames
   int32_t path;         ///< relit_path; default RELIT_PATH_AUTO
-  uint64_t memory_budget_bytes;  ///< 0 (default): no bound. What cannot fit is refused with
-                                 ///< RELIT_OUT_OF_MEMORY, and the least budget that would do said
-  double target_fps;             ///< display rate that the governor defends; 0 (default): 60
-  double quality;                ///< 0..1: fixed; negative (default): the governor chooses
+  /// 0 (default): no bound. What cannot fit is refused with RELIT_OUT_OF_MEMORY, and the least
+  /// budget that would do is said. It holds for one clip; while two cross-fade, each may take it.
+  uint64_t memory_budget_bytes;
+  double target_fps;    ///< display rate that the governor defends; 0 (default): 60
+  double quality;       ///< 0..1: fixed; negative (default): the governor chooses
   const char* decoder;  ///< an FFmpeg decoder by name, such as "h264_v4l2m2m", for the codecs it
                         ///< fits; where it does not open, software does, with a warning
   const char* const* http_headers;  ///< "Name: value", ended by NULL; or NULL (default)
@@ -327,9 +328,9 @@ typedef struct relit_sequence_entry {
 } relit_sequence_entry;
 
 /// Plays one clip, from its beginning at the next relit_update(). With cross_fade_s > 0 light maps
-/// and poses blend over from what is playing. RELIT_NOT_FOUND for a clip that is not there;
-/// RELIT_UNSUPPORTED where the source cannot seek; RELIT_INVALID for a fade that is negative or not
-/// finite.
+/// and poses blend over from what is playing (where the source cannot seek, it is a cut).
+/// RELIT_NOT_FOUND for a clip that is not there; RELIT_UNSUPPORTED for another one where the source
+/// cannot seek; RELIT_INVALID for a fade that is negative or not finite.
 RELIT_API relit_result relit_play_clip(relit_player* player, uint32_t clip,
                                        double cross_fade_s) RELIT_NOEXCEPT;
 /// Plays clips one after the other, `loop` (0 or 1) from the first again. `entries` is copied.
@@ -343,12 +344,13 @@ RELIT_API relit_result relit_set_paused(relit_player* player, int32_t paused) RE
 RELIT_API relit_result relit_set_speed(relit_player* player, double speed) RELIT_NOEXCEPT;
 RELIT_API relit_result relit_set_loop(relit_player* player, relit_loop loop) RELIT_NOEXCEPT;
 /// To a time of the clip or sequence. Before the start counts as the start, beyond the end as the
-/// last frame (of what loops: as the remainder). RELIT_INVALID where not finite; RELIT_UNSUPPORTED
-/// for going back where the source cannot. What was being decoded is dropped; the last picture
-/// stays until the new one is here.
+/// last frame (of what loops: as the remainder). RELIT_INVALID where not finite. What was being
+/// decoded is dropped; the last picture stays until the new one is here. Where a source cannot go
+/// back, relit_update() then says RELIT_NOT_FOUND.
 RELIT_API relit_result relit_seek(relit_player* player, double time_s) RELIT_NOEXCEPT;
 /// To the start of a frame of the clip that is playing; a sequence becomes that one clip. Beyond
-/// the end: the last frame.
+/// the end: the last frame. RELIT_NOT_FOUND where frames are of unequal length, and that one has
+/// not come near yet.
 RELIT_API relit_result relit_seek_frame(relit_player* player, uint64_t frame) RELIT_NOEXCEPT;
 /// Pauses, and goes so many frames on or back, around the ends of what loops.
 RELIT_API relit_result relit_step(relit_player* player, int32_t frames) RELIT_NOEXCEPT;
@@ -503,7 +505,8 @@ typedef struct relit_statistics {
   uint64_t composites;
   // Damage.
   uint64_t lost_frames, lost_records, lost_segments;
-  // Milliseconds, the mean of the last second; 0 where it did not happen.
+  // Milliseconds, means in which the latest count most (decode_ms: of all); 0 where it did not
+  // happen.
   double decode_ms;     ///< a frame, all layers, summed over threads
   double composite_ms;  ///< a composite, the upload included
   double draw_ms;       ///< relit_draw(), as far as the processor takes part
