@@ -39,9 +39,9 @@ ClipVoice::Frames ClipVoice::go_to(const FramePosition& position, bool interpola
   return frames;
 }
 
-Status ClipVoice::set_light(const decoders::Light& light, bool varying) {
+Status ClipVoice::set_light(const decoders::Light& light) {
   RELIT_TRY(relighter_->set_light(light, allowed_));
-  return fetch_needed(!varying);
+  return fetch_needed(false);
 }
 
 void ClipVoice::allow(std::span<const std::uint8_t> layers) {

@@ -42,9 +42,9 @@ class ClipVoice {
   /// Goes to a position; never waits. The frames are valid until the next call.
   Frames go_to(const FramePosition& position, bool interpolate);
 
-  /// Folds a light, and fetches from then on what it needs. Where `varying`, all allowed layers
-  /// are, since others may be needed the next moment. Errors: kInvalid, those of decoders.
-  Status set_light(const decoders::Light& light, bool varying);
+  /// Folds a light, and fetches from then on what it needs besides what is fetched already. Errors:
+  /// kInvalid, those of decoders.
+  Status set_light(const decoders::Light& light);
   /// Which layers may be fetched at all, by layer; takes effect with the next set_light().
   void allow(std::span<const std::uint8_t> layers);
   /// Sees to it that what the relighter needs is fetched; with `may_drop`, no more than that.

@@ -126,10 +126,12 @@ struct Player::State final : FrameTimes {
   PlayerMoment moment;
   std::optional<std::int64_t> last_ns, late_since_ns;
   double light_time_s = 0;
-  bool light_stale = true;          ///< a relighter has not got the light yet
-  bool recomposite = false;         ///< something else than frame and light has changed
-  bool shown_complete = false;      ///< all planes of the frame that is shown were here
-  std::uint64_t composited_at = 0;  ///< the update that composited last
+  bool light_stale = true;             ///< a relighter has not got the light yet
+  std::uint64_t light_changed_at = 0;  ///< the update that folded one last
+  bool layers_settled = false;         ///< what that light does not need is not fetched
+  bool recomposite = false;            ///< something else than frame and light has changed
+  bool shown_complete = false;         ///< all planes of the frame that is shown were here
+  std::uint64_t composited_at = 0;     ///< the update that composited last
   std::string reported_error;
   bool seeking = true;  ///< frames passed over were not due
   std::atomic<bool> cancelled{false};

@@ -12,6 +12,7 @@ namespace {
 // How long a frame may be late before the clock stands: what is only slow is skipped over, what has
 // stalled is waited for.
 constexpr std::int64_t kPatienceNs = 250'000'000;
+constexpr std::uint64_t kRestingUpdates = 120;
 
 }  // namespace
 
@@ -133,13 +134,22 @@ Status Player::State::bring_light(bool& changed) {
   const bool moved = light->sample(light_time_s);
   const bool fold = moved || light_stale;
   changed |= fold;
+  // What a light does not need is fetched no more when it has rested for a while: fetching it again
+  // costs a seek, and the next light may need it.
+  if (fold) {
+    light_changed_at = counted.updates;
+    layers_settled = false;
+  }
+  const bool settle =
+      !layers_settled && !light->varies() && counted.updates - light_changed_at >= kRestingUpdates;
+  layers_settled |= settle;
   if (moved) backdrop_stale = true;
   const Quality quality = governor->quality();
   for (ClipVoice* voice : voices()) {
     if (voice == nullptr) continue;
     Relighter& relighter = *voice->relighter();
-    if (fold) RELIT_TRY(voice->set_light(light->now(), light->varies()));
-    if (!fold && recomposite) RELIT_TRY(voice->fetch_needed(false));
+    if (fold) RELIT_TRY(voice->set_light(light->now()));
+    if (!fold && (recomposite || settle)) RELIT_TRY(voice->fetch_needed(settle));
     std::size_t planes = 0;
     for (const container::LayerRecord& layer : voice->prefetcher().layers())
       planes += layer.planes.size();
@@ -185,6 +195,10 @@ Status Player::State::composite() {
   if (secondary_frames.from != nullptr) {
     RELIT_TRY(secondary->relighter()->composite(secondary_frames.mix()));
     RELIT_TRY(primary->relighter()->fade(*secondary->relighter(), secondary_weight));
+  }
+  if (lit != primary.get()) {  // such as a decoder that is not there
+    for (const std::string& note : primary->prefetcher().stats().notes)
+      say(LogLevel::kWarning, note);
   }
   lit = primary.get();
   if (leaving) {
@@ -235,6 +249,10 @@ Result<bool> Player::State::wait(double timeout_s) {
     RELIT_TRY(primary->prefetcher().frame_at(now.primary.tick));
     now = playback->now();
   }
+  // The light may need layers that are fetched anew.
+  bool anew = false;
+  RELIT_TRY(bring_light(anew));
+  recomposite |= anew;
   RELIT_ASSIGN(bool here, wait_for(*primary, now.primary, timeout_s));
   if (here && now.secondary) {
     RELIT_ASSIGN(here, wait_for(*secondary, *now.secondary,

@@ -151,6 +151,21 @@ TEST_CASE("api: seeking beyond the ends shows the last and the first frame") {
   CHECK(waited(player).frame == 1);
 }
 
+TEST_CASE("api: frames of unequal length are found by time") {
+  CodedFile how;
+  how.uneven = true;  // frames of 1, 2, 1 and 2 ticks
+  const auto bytes = coded_file(how);
+  const ApiPlayer player(bytes);
+  REQUIRE(player.result == RELIT_OK);
+  const double tick_s = clip_of(player).duration_s / 6;
+  for (const auto& [tick, frame] : {std::pair{5.5, 3u}, std::pair{0.5, 0u}, std::pair{2.5, 1u},
+                                    std::pair{3.5, 2u}, std::pair{4.5, 3u}}) {
+    INFO(tick);
+    REQUIRE(relit_seek(player, tick * tick_s) == RELIT_OK);
+    CHECK(waited(player).frame == frame);
+  }
+}
+
 TEST_CASE("api: the clock moves pictures on, stands when paused, and keeps the speed") {
   const ApiPlayer player(mannequin());
   REQUIRE(player.result == RELIT_OK);

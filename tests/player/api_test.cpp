@@ -338,6 +338,20 @@ TEST_CASE("api: a budget is kept, or refused with the one that would do") {
   CHECK(statistics.planned_bytes > 0);
 }
 
+TEST_CASE("api: a decoder that is not there gives way to software, and the log says so") {
+  relit_open_options options = default_options();
+  options.decoder = "h264_no_such_decoder";
+  std::string said;
+  options.log = [](void* user, relit_log_level level, const char* text) {
+    if (level == RELIT_LOG_WARNING) *static_cast<std::string*>(user) += text;
+  };
+  options.log_user = &said;
+  const ApiPlayer player(mannequin(), options);
+  REQUIRE(player.result == RELIT_OK);
+  waited(player);
+  CHECK(said.find("h264_no_such_decoder") != std::string::npos);
+}
+
 TEST_CASE("api: what a file holds is told") {
   const ApiPlayer player(mannequin());
   REQUIRE(player.result == RELIT_OK);
