@@ -24,6 +24,8 @@ extern const std::string_view dither;
 extern const std::string_view gradient_frag;
 extern const std::string_view mix_frag;
 extern const std::string_view mix_vert;
+extern const std::string_view overlay_frag;
+extern const std::string_view overlay_vert;
 extern const std::string_view prelude;
 extern const std::string_view present_frag;
 extern const std::string_view present_vert;

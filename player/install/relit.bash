@@ -19,7 +19,7 @@ _relit() {
     --backend) mapfile -t COMPREPLY < <(compgen -W "egl egl-es2 egl-es2-mediump osmesa cpu" -- "$cur"); return ;;
     --tone-map) mapfile -t COMPREPLY < <(compgen -W "neutral filmic linear" -- "$cur"); return ;;
     --background) mapfile -t COMPREPLY < <(compgen -W "light sh none" -- "$cur"); return ;;
-    --path) mapfile -t COMPREPLY < <(compgen -W "auto cpu texture fused" -- "$cur"); return ;;
+    --composite) mapfile -t COMPREPLY < <(compgen -W "auto cpu texture fused" -- "$cur"); return ;;
   esac
   if [[ $cur == -* ]]; then
     compopt +o filenames 2>/dev/null

@@ -8,6 +8,7 @@
 #include "gles/character_renderer.hpp"
 #include "gles/compositor.hpp"
 #include "gles/light_map_mixer.hpp"
+#include "gles/overlay.hpp"
 #include "gles/picture.hpp"
 #include "tests/gles/backends.hpp"
 #include "tests/gles/drawing.hpp"
@@ -304,7 +305,7 @@ struct Everything {
   std::vector<std::uint8_t> pixels;
   std::vector<float> light;
 
-  void run(const Device& device, const Scene& scene, const std::function<void(GLuint)>& aim) {
+  void run(const Device& device, const Scene& scene, const std::function<void(GLuint, int)>& aim) {
     auto around = [&](int units, auto&& operation) {
       before(units);
       auto result = operation();
@@ -361,25 +362,31 @@ struct Everything {
     View view;
     view.x = 2, view.y = 1;
     view.width = framebuffer.draw_width() - 4, view.height = framebuffer.draw_height() - 3;
-    auto shoot = [&](auto&& draw) {
+    auto shoot = [&](int units, auto&& draw) {
       framebuffer.bind();
       GLint bound = 0;
       device.gl().GetIntegerv(GL_FRAMEBUFFER_BINDING, &bound);
       device.gl().ClearColor(0, 0, 0, 0);
       device.gl().Clear(GL_COLOR_BUFFER_BIT);
-      aim(static_cast<GLuint>(bound));
+      aim(static_cast<GLuint>(bound), units);
       const Status drawn = draw();
-      aim(0);
+      aim(0, units);
       require(drawn);
       step(1, [&] { return framebuffer.resolve(); });
       std::vector<std::uint8_t> rgba(4 * kSide * kSide);
       step(1, [&] { return framebuffer.read_back(rgba); });
       pixels.insert(pixels.end(), rgba.begin(), rgba.end());
     };
-    shoot([&] { return renderer->draw(view, mixed); });
+    shoot(2, [&] { return renderer->draw(view, mixed); });
+    auto overlay = around(1, [&] { return Overlay::create(device); });
+    OverlayCanvas canvas;
+    canvas.begin(framebuffer.draw_width(), framebuffer.draw_height(), 1);
+    canvas.panel({1, 1, canvas.width() - 2, canvas.height() - 2}, {255, 128, 40, 128});
+    canvas.text(2, 0, "a", {});
+    shoot(1, [&] { return overlay->draw(canvas); });
     if (device.profile() != Profile::kEs2Mediump) {
       FusedLight* fused = take(compositor->fuse(scene.light_, {0, 1, 0.25f}));  // calls no GL
-      shoot([&] { return renderer->draw(view, *fused); });
+      shoot(2, [&] { return renderer->draw(view, *fused); });
     }
   }
 };
@@ -391,7 +398,7 @@ TEST_CASE("a host that has dirtied all GL state gets the same picture and the pr
   const Scene scene({"state", 24, 20, 4, 8, true, 2});
   on_each_backend([&](const Device& clean, const Backend& backend) {
     Everything expected;
-    expected.run(clean, scene, [](GLuint) {});
+    expected.run(clean, scene, [](GLuint, int) {});
 
     // A device of its own, made amidst the mess: the same context serves both.
     const GetProcAddress get = backend_context().get_proc_address();
@@ -403,12 +410,12 @@ TEST_CASE("a host that has dirtied all GL state gets the same picture and the pr
     dirty.before = [&](int) { host.make_a_mess(); };
     dirty.after = [&](int units) { host.check_left(units); };
     GLuint target = 0;
-    dirty.run(*device, scene, [&](GLuint framebuffer) {
+    dirty.run(*device, scene, [&](GLuint framebuffer, int units) {
       if (framebuffer != 0) {
         target = framebuffer;
         host.make_a_mess(target);
       } else {
-        host.check_left(2, target);
+        host.check_left(units, target);
       }
     });
     CHECK(dirty.light == expected.light);
