@@ -256,6 +256,7 @@ Status Bake::write() {
   ids.clip_id = prepared_.pose.track.clip_id;
   ids.first_track_id = prepared_.pose.track.track_id + 1;
   RELIT_ASSIGN(PlaneEncoder encoder, PlaneEncoder::begin(std::move(scan), ids));
+  summary_.decoder_bytes = encoder.decoder_bytes();
   RELIT_ASSIGN(auto sink, container::FileSink::create(options_.output.string()));
   RELIT_ASSIGN(container::Writer writer,
                container::Writer::create(*sink, "relit-bake " RELIT_VERSION));

@@ -52,6 +52,7 @@ struct BakeSummary {
   float largest_t0 = -std::numeric_limits<float>::infinity();
   double trace_s = 0, code_s = 0;
   std::uint64_t bytes = 0, image_bytes = 0, mesh_bytes = 0, pose_bytes = 0, video_bytes = 0;
+  std::uint64_t decoder_bytes = 0;  ///< of the pictures that the decoders hold
   std::vector<std::string> warnings;
 };
 

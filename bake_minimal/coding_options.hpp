@@ -54,6 +54,9 @@ struct CodingOptions {
   /// Pictures that a decoder has to keep, at most (h264, hevc). More costs the player memory and
   /// gains next to nothing: 2, 4 and 16 were within 0.5 % of each other.
   int reference_frames = 3;
+  /// Bytes that the pictures of all tracks' decoders may take together: what they refer to and what
+  /// waits for its turn (h264, hevc) is cut down until they fit. 0: no bound.
+  std::uint64_t decode_memory = 0;
 
   /// Without exponents: the same quantisation step for all bands, instead of steps in inverse
   /// proportion to the light that falls on the band (kLightRms).

@@ -10,6 +10,9 @@
 #include <thread>
 #include <utility>
 
+#include "decoders/decoder_memory.hpp"
+#include "decoders/plane_decoder.hpp"
+
 namespace relit::bake {
 namespace {
 
@@ -53,7 +56,6 @@ VideoSettings mantissa_settings(const LayerRecord& record, const CodingOptions& 
   s.lossless = record.lossless;
   s.crf = *o.crf;
   s.preset = o.preset;
-  s.reference_frames = o.reference_frames;
   s.segment_frames = o.segment_frames;
   return s;
 }
@@ -95,22 +97,64 @@ Result<PlaneEncoder> PlaneEncoder::begin(RangeScan scan, const ModelIds& ids) {
   for (LayerPlan& plan : plans) {
     auto state = std::make_unique<LayerState>();
     state->plan = std::move(plan);
-    RELIT_TRY(encoder.open_layer(*state));
-    encoder.layers_.push_back(state->plan.record);
     encoder.states_.push_back(std::move(state));
   }
+  RELIT_TRY(encoder.open_layers());
+  for (const auto& state : encoder.states_) encoder.layers_.push_back(state->plan.record);
   return encoder;
 }
 
-Status PlaneEncoder::open_layer(LayerState& layer) {
+// From what compresses best to what a decoder has least to keep for. A pyramid takes four
+// references whatever is asked for.
+std::vector<PlaneEncoder::Keeping> PlaneEncoder::keepings(const CodingOptions& o) {
+  std::vector<Keeping> list{{o.reference_frames, Reordering::kPyramid}};
+  const bool adjustable = o.codec == "h264" || o.codec == "hevc";
+  if (o.decode_memory == 0 || !adjustable) return list;
+  for (int references = o.reference_frames; references >= 1; --references) {
+    list.push_back({references, Reordering::kFlat});
+  }
+  list.push_back({1, Reordering::kNone});
+  return list;
+}
+
+Status PlaneEncoder::open_layers() {
+  const std::uint64_t budget = scan_.options().decode_memory;
+  for (const Keeping& keeping : keepings(scan_.options())) {
+    decoder_bytes_ = 0;
+    for (const auto& state : states_) {
+      RELIT_TRY(open_layer(*state, keeping));
+      const LayerRecord& record = state->plan.record;
+      RELIT_TRY(count_pictures(decoders::mantissa_format(record), record.mantissa_pictures));
+      if (record.has_exponents) {
+        RELIT_TRY(count_pictures(decoders::exponent_format(record), record.exponent_pictures));
+      }
+    }
+    if (budget == 0 || decoder_bytes_ <= budget) return {};
+  }
+  return fail(ErrorCode::kInvalid, "--decode-memory " + std::to_string(budget) +
+                                       ": with this codec and size the pictures "
+                                       "of the decoders take at least " +
+                                       std::to_string(decoder_bytes_) +
+                                       " bytes; use a smaller --size or --order, or --bit-depth 8");
+}
+
+Status PlaneEncoder::count_pictures(const decoders::VideoFormat& format, int pictures) {
+  RELIT_ASSIGN(const std::uint64_t bytes, decoders::picture_buffer_bytes(format));
+  decoder_bytes_ += bytes * decoders::decoder_memory(format, pictures, 1).pictures;
+  return {};
+}
+
+Status PlaneEncoder::open_layer(LayerState& layer, const Keeping& keeping) {
   LayerRecord& record = layer.plan.record;
   const auto components = static_cast<std::size_t>(component_count(quantiser_.basis()));
   for (std::size_t k = 0; k < record.planes.size(); ++k) {
     const auto n = static_cast<std::size_t>(layer.plan.coefficients[k / components]);
     record.planes[k].scale = static_cast<float>(steps_[n][k % components].scale);
   }
-  RELIT_ASSIGN(VideoEncoder mantissas,
-               VideoEncoder::open(mantissa_settings(record, scan_.options())));
+  VideoSettings settings = mantissa_settings(record, scan_.options());
+  settings.reference_frames = keeping.reference_frames;
+  settings.reordering = keeping.reordering;
+  RELIT_ASSIGN(VideoEncoder mantissas, VideoEncoder::open(settings));
   record.codec_private = mantissas.codec_private();
   record.mantissa_pictures = mantissas.decoder_pictures();
   layer.mantissas.emplace(std::move(mantissas));

@@ -14,6 +14,7 @@
 #include "bake_minimal/video_encoder.hpp"
 #include "container/base/result.hpp"
 #include "container/records.hpp"
+#include "decoders/video_decoder.hpp"
 
 /// Transfer -> layers and their packets (design, section 4).
 namespace relit::bake {
@@ -39,12 +40,16 @@ struct EncodedSegment {
 class PlaneEncoder {
  public:
   /// `scan` has seen all frames of the clip. Errors: kInvalid for a clip without frames; those of
-  /// plan_layers() and VideoEncoder::open().
+  /// plan_layers() and VideoEncoder::open(); kInvalid when the decoders' pictures cannot be brought
+  /// below options.decode_memory, naming what they take at least.
   static Result<PlaneEncoder> begin(RangeScan scan, const ModelIds& ids);
 
   [[nodiscard]] const container::ModelRecord& model() const { return model_; }
   /// Complete from begin() on.
   [[nodiscard]] const std::vector<container::LayerRecord>& layers() const { return layers_; }
+
+  /// Bytes of the pictures that decoders of all layers hold together, padding included.
+  [[nodiscard]] std::uint64_t decoder_bytes() const { return decoder_bytes_; }
 
   /// The frames that `scan` has seen, in the same order; [coefficients][3][H][W].
   /// Errors: those of check_transfer(); kInvalid when the frame exceeds the ranges scanned.
@@ -75,7 +80,15 @@ class PlaneEncoder {
   };
 
   PlaneEncoder(RangeScan scan, const ModelIds& ids);
-  Status open_layer(LayerState& layer);
+  /// What a decoder may be asked to keep.
+  struct Keeping {
+    int reference_frames;
+    Reordering reordering;
+  };
+  [[nodiscard]] static std::vector<Keeping> keepings(const CodingOptions& options);
+  Status open_layers();
+  Status count_pictures(const decoders::VideoFormat& format, int pictures);
+  Status open_layer(LayerState& layer, const Keeping& keeping);
   Status encode_layer(LayerState& layer, std::span<const float> transfer);
   Status quantise_tile(LayerState& layer, std::size_t tile, std::span<const float> transfer);
   Status finish_layer(LayerState& layer) const;
@@ -89,6 +102,7 @@ class PlaneEncoder {
   container::ModelRecord model_;
   std::vector<container::LayerRecord> layers_;
   std::vector<std::unique_ptr<LayerState>> states_;
+  std::uint64_t decoder_bytes_ = 0;
   std::uint64_t next_frame_ = 0;
   std::uint32_t next_segment_ = 0;
   bool finished_ = false;

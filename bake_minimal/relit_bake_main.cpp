@@ -154,6 +154,11 @@ void add_options(CLI::App& app, Arguments& a) {
       ->group("Coding");
   app.add_option("--encoder-preset", a.bake.coding.preset, "the encoder's own speed preset")
       ->group("Coding");
+  app.add_option("--decode-memory", a.bake.coding.decode_memory,
+                 "bytes that the decoders' pictures may take (such as 16MiB), by fewer references "
+                 "and less reordering; 0: no bound")
+      ->transform(CLI::AsSizeValue(false))
+      ->group("Coding");
   app.add_option("--pose", a.pose, "auto, joints or vertices")
       ->check(CLI::IsMember({"auto", "joints", "vertices"}))
       ->capture_default_str()
@@ -192,9 +197,10 @@ Status complete(Arguments& a, const CLI::App& app) {
       bake.ground->albedo = {a.ground_color[0], a.ground_color[1], a.ground_color[2]};
   }
   if (a.preset == "paper") {
-    const int threads = bake.coding.threads;
+    const CodingOptions given = bake.coding;
     bake.coding = paper_options();
-    bake.coding.threads = threads;
+    bake.coding.threads = given.threads;
+    bake.coding.decode_memory = given.decode_memory;
   }
   if (a.layout == "grid" && a.preset.empty()) bake.coding.layout = Layout::kGrid;
   if (app.count("--crf") > 0) bake.coding.crf = a.crf;
@@ -238,11 +244,9 @@ void print_json(const BakeSummary& s, const BakeOptions& options) {
   json["rays"] = s.rays;
   json["t0"] = {s.least_t0, s.largest_t0};
   json["seconds"] = {{"trace", s.trace_s}, {"code", s.code_s}};
-  json["bytes"] = {{"file", s.bytes},
-                   {"images", s.image_bytes},
-                   {"meshes", s.mesh_bytes},
-                   {"pose", s.pose_bytes},
-                   {"video", s.video_bytes}};
+  json["bytes"] = {{"file", s.bytes},        {"images", s.image_bytes},
+                   {"meshes", s.mesh_bytes}, {"pose", s.pose_bytes},
+                   {"video", s.video_bytes}, {"decoder_pictures", s.decoder_bytes}};
   json["warnings"] = s.warnings;
   std::printf("%s\n", json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
 }

@@ -73,6 +73,8 @@ class Options {
 
 void configure_x264(const VideoSettings& s, AVCodecContext& context, Options& options) {
   context.refs = s.reference_frames;
+  if (s.reordering == Reordering::kNone) context.max_b_frames = 0;
+  if (s.reordering == Reordering::kFlat) options.set("b-pyramid", "none");
   options.set("preset", s.preset);
   options.set("tune", "psnr");
   options.set("forced-idr", "1");
@@ -88,6 +90,8 @@ void configure_x265(const VideoSettings& s, Options& options) {
   std::string p =
       "log-level=none:info=0:pools=none:frame-threads=1:wpp=0:scenecut=0:open-gop=0:keyint=" +
       std::to_string(s.segment_frames) + ":min-keyint=1:ref=" + std::to_string(s.reference_frames);
+  if (s.reordering == Reordering::kNone) p += ":bframes=0";
+  if (s.reordering == Reordering::kFlat) p += ":b-pyramid=0";
   // Pictures smaller than a coding tree unit are refused.
   if (std::min(s.width, s.height) < 64) p += ":ctu=16";
   // x265 3.5 writes its tree of costs eight blocks of 16 at a time, beyond the end of the heap

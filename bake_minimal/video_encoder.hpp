@@ -15,6 +15,13 @@
 /// pictures always give the same bytes.
 namespace relit::bake {
 
+/// How pictures may be coded out of their order (h264, hevc; mpeg4 with B-VOPs or without).
+enum class Reordering {
+  kNone,     ///< every picture refers to earlier ones
+  kFlat,     ///< some refer to later ones too, and none refers to those
+  kPyramid,  ///< some of those are referred to
+};
+
 struct VideoSettings {
   std::string codec;  ///< as CodingOptions::codec
   int width = 0;
@@ -25,6 +32,7 @@ struct VideoSettings {
   double crf = 18;  ///< as CodingOptions::crf
   std::string preset;
   int reference_frames = 3;
+  Reordering reordering = Reordering::kPyramid;
   int segment_frames = 25;  ///< pictures a segment: how often there is a key picture
 };
 

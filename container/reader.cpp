@@ -248,7 +248,42 @@ Result<RecordBody> Reader::read_body(const RecordHeader& header) {
                                        std::to_string(options_.max_record_bytes));
   }
   RELIT_ASSIGN(const auto payload, input_.payload());
-  return parse_body(header.type, payload);
+  return parse_payload(header.type, payload);
+}
+
+Result<RecordBody> Reader::parse_payload(RecordType type, std::span<const std::uint8_t> payload) {
+  if (type == types::kSegment) {
+    SegmentRecord segment = std::exchange(spare_segment_, {});
+    RELIT_TRY(parse_segment_into(payload, segment));
+    return RecordBody(std::move(segment));
+  }
+  if (type == types::kChunk) {
+    ChunkRecord chunk = take_spare(segment_->chunks[chunk_ - 1].track_id);
+    RELIT_TRY(parse_chunk_into(payload, chunk));
+    return RecordBody(std::move(chunk));
+  }
+  return parse_body(type, payload);
+}
+
+void Reader::recycle(ChunkRecord&& chunk) {
+  constexpr std::size_t kMostSpares = 256;
+  if (spare_chunks_.size() < kMostSpares) spare_chunks_.push_back(std::move(chunk));
+}
+
+std::size_t Reader::spare_bytes() const {
+  std::size_t bytes = 0;
+  for (const ChunkRecord& chunk : spare_chunks_) bytes += storage_bytes(chunk);
+  return bytes;
+}
+
+ChunkRecord Reader::take_spare(std::uint32_t track_id) {
+  if (spare_chunks_.empty()) return {};
+  auto spare = std::ranges::find(spare_chunks_, track_id, &ChunkRecord::track_id);
+  if (spare == spare_chunks_.end()) --spare;
+  std::swap(*spare, spare_chunks_.back());
+  ChunkRecord chunk = std::move(spare_chunks_.back());
+  spare_chunks_.pop_back();
+  return chunk;
 }
 
 /// Notes what the record says about its surroundings, and refuses what contradicts them.

@@ -9,6 +9,7 @@
 #include <variant>
 #include <vector>
 
+#include "container/base/kept.hpp"
 #include "container/base/limits.hpp"
 #include "container/base/result.hpp"
 #include "container/byte_source.hpp"
@@ -82,6 +83,13 @@ class Reader {
   /// everything static has been read. Errors: as next().
   Result<bool> static_part_ended();
 
+  /// Takes records that next() gave back: later ones use their storage, a chunk preferably that of
+  /// its own track, so that reading on and on allocates nothing.
+  void recycle(SegmentRecord&& segment) { spare_segment_ = std::move(segment); }
+  void recycle(ChunkRecord&& chunk);
+  /// What the storage of the chunks that were given back takes.
+  [[nodiscard]] std::size_t spare_bytes() const;
+
   /// From the next chunk on, only chunks of these tracks come out of next(); by default all do.
   void set_wanted_tracks(std::optional<std::vector<std::uint32_t>> tracks);
   /// Passes over the rest of the current segment's chunks.
@@ -133,6 +141,8 @@ class Reader {
   void pass_unknown(const RecordHeader& header, std::uint64_t offset);
   Status check_place(const RecordHeader& header);
   Result<RecordBody> read_body(const RecordHeader& header);
+  Result<RecordBody> parse_payload(RecordType type, std::span<const std::uint8_t> payload);
+  [[nodiscard]] ChunkRecord take_spare(std::uint32_t track_id);
   Result<RecordBody> accept(RecordBody body, std::uint64_t offset);
   Status accept_segment(const SegmentRecord& segment);
   Status accept_end(const EndRecord& end, std::uint64_t offset) const;
@@ -147,12 +157,14 @@ class Reader {
   RecordInput input_;
   HeaderRecord header_;
 
-  int order_ = 0;                         ///< order_of() of the last record
-  std::optional<SegmentRecord> segment_;  ///< whose chunks are being read
-  std::size_t chunk_ = 0;                 ///< the next of them
+  int order_ = 0;                ///< order_of() of the last record
+  Kept<SegmentRecord> segment_;  ///< whose chunks are being read
+  std::size_t chunk_ = 0;        ///< the next of them
   std::optional<std::uint32_t> next_segment_index_ = 0;
   std::optional<IndexRecord::Entry> sought_;
   std::optional<std::vector<std::uint32_t>> wanted_;  ///< sorted
+  SegmentRecord spare_segment_;
+  std::vector<ChunkRecord> spare_chunks_;
   std::uint64_t static_bytes_ = 0;
   std::optional<EndRecord> end_;       ///< read beforehand, where that spares bytes
   std::uint64_t static_end_ = 0;       ///< where the first segment is expected; 0: unknown

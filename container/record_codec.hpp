@@ -50,6 +50,10 @@ namespace relit::container {
 [[nodiscard]] Result<LayerRecord> parse_layer(std::span<const std::uint8_t> payload);
 [[nodiscard]] Result<SegmentRecord> parse_segment(std::span<const std::uint8_t> payload);
 [[nodiscard]] Result<ChunkRecord> parse_chunk(std::span<const std::uint8_t> payload);
+/// The same into records whose storage is reused; what they hold after an error is undefined.
+[[nodiscard]] Status parse_segment_into(std::span<const std::uint8_t> payload,
+                                        SegmentRecord& record);
+[[nodiscard]] Status parse_chunk_into(std::span<const std::uint8_t> payload, ChunkRecord& record);
 [[nodiscard]] Result<IndexRecord> parse_index(std::span<const std::uint8_t> payload);
 [[nodiscard]] Result<EndRecord> parse_end(std::span<const std::uint8_t> payload);
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // SEGM, CHNK, INDX, FEND.
 #include <algorithm>
+#include <array>
 
 #include "container/base/bytes.hpp"
 #include "container/framing.hpp"
@@ -12,6 +13,22 @@ namespace relit::container {
 using namespace checks;
 
 namespace {
+
+/// Whether no two members are equal. Segments of a usual length need no memory for that.
+template <class T, class Member>
+bool all_distinct(const std::vector<T>& records, Member T::*member) {
+  std::array<Member, 512> few{};
+  std::vector<Member> many;
+  std::span<Member> values(few);
+  if (records.size() > few.size()) {
+    many.resize(records.size());
+    values = many;
+  }
+  values = values.first(records.size());
+  std::ranges::transform(records, values.begin(), member);
+  std::ranges::sort(values);
+  return std::ranges::adjacent_find(values) == values.end();
+}
 
 constexpr std::size_t kChunkSizeBytes = 16;
 constexpr std::size_t kIndexEntryBytes = 40;
@@ -50,8 +67,13 @@ std::vector<std::uint8_t> serialize(const SegmentRecord& record) {
 }
 
 Result<SegmentRecord> parse_segment(std::span<const std::uint8_t> payload) {
-  ByteReader r(payload);
   SegmentRecord record;
+  RELIT_TRY(parse_segment_into(payload, record));
+  return record;
+}
+
+Status parse_segment_into(std::span<const std::uint8_t> payload, SegmentRecord& record) {
+  ByteReader r(payload);
   const auto marker = r.raw("marker", kSegmentMarker.size());
   if (r.ok() && !std::ranges::equal(marker, kSegmentMarker))
     r.fail(ErrorCode::kCorrupt, "marker", "not the segment marker");
@@ -69,8 +91,7 @@ Result<SegmentRecord> parse_segment(std::span<const std::uint8_t> payload) {
   record.durations.resize(r.count("durations", limits::kFramesPerSegment, 4));
   for (std::uint32_t& ticks : record.durations) ticks = r.u32("durations");
   RELIT_TRY(r.finish());
-  RELIT_TRY(validate(record));
-  return record;
+  return validate(record);
 }
 
 Status validate(const SegmentRecord& record) {
@@ -85,16 +106,14 @@ Status validate(const SegmentRecord& record) {
   RELIT_TRY(at_most(record.first_tick, limits::kTicks, "first_tick"));
   RELIT_TRY(at_most(record.first_tick + duration_ticks(record), limits::kTicks, "end in ticks"));
   RELIT_TRY(at_most(record.chunks.size(), limits::kChunksPerSegment, "number of chunks"));
-  std::vector<std::uint32_t> tracks;
   for (const auto& chunk : record.chunks) {
     RELIT_TRY(at_most(chunk.chunk_bytes, record_bytes(limits::kRecordBytes), "chunk_bytes"));
     RELIT_REQUIRE(
         chunk.chunk_bytes > kRecordHeaderBytes && chunk.chunk_bytes % kRecordAlignment == 0,
         "chunk_bytes " + std::to_string(chunk.chunk_bytes) + " is not the length of a record");
-    tracks.push_back(chunk.track_id);
   }
-  std::ranges::sort(tracks);
-  RELIT_REQUIRE(std::ranges::adjacent_find(tracks) == tracks.end(), "two chunks of the same track");
+  RELIT_REQUIRE(all_distinct(record.chunks, &SegmentRecord::ChunkSize::track_id),
+                "two chunks of the same track");
   return {};
 }
 
@@ -145,8 +164,13 @@ void read_packets(ByteReader& r, std::uint64_t first_pts, std::vector<Packet>& p
 }  // namespace
 
 Result<ChunkRecord> parse_chunk(std::span<const std::uint8_t> payload) {
-  ByteReader r(payload);
   ChunkRecord record;
+  RELIT_TRY(parse_chunk_into(payload, record));
+  return record;
+}
+
+Status parse_chunk_into(std::span<const std::uint8_t> payload, ChunkRecord& record) {
+  ByteReader r(payload);
   record.track_id = r.u32("track_id");
   record.segment_index = r.u32("segment_index");
   const auto first_pts = r.u64("first_pts");
@@ -164,29 +188,24 @@ Result<ChunkRecord> parse_chunk(std::span<const std::uint8_t> payload) {
   RELIT_TRY(table.finish());
   const auto data = r.raw("data", r.remaining());
   record.data.assign(data.begin(), data.end());
-  RELIT_TRY(validate(record));
-  return record;
+  return validate(record);
 }
 
 Status validate(const ChunkRecord& record) {
   RELIT_REQUIRE(record.segment_index < limits::kSegments, "segment_index is too large");
   RELIT_TRY(one_to(record.packets.size(), limits::kPacketsPerChunk, "number of packets"));
   std::uint64_t offset = 0;
-  std::vector<std::int64_t> times;
-  times.reserve(record.packets.size());
   for (const Packet& p : record.packets) {
     RELIT_REQUIRE(p.pts >= 0 && static_cast<std::uint64_t>(p.pts) < limits::kFrames,
                   "packet.pts is outside the clip");
     RELIT_TRY(at_most(p.size, limits::kRecordBytes, "packet.size"));
     RELIT_REQUIRE(p.offset == offset, "packets do not follow one another in the data");
     offset += p.size;
-    times.push_back(p.pts);
   }
   RELIT_REQUIRE(offset == record.data.size(), "the packets have " + std::to_string(offset) +
                                                   " bytes, the data " +
                                                   std::to_string(record.data.size()));
-  std::ranges::sort(times);
-  RELIT_REQUIRE(std::ranges::adjacent_find(times) == times.end(), "two packets with the same pts");
+  RELIT_REQUIRE(all_distinct(record.packets, &Packet::pts), "two packets with the same pts");
   return {};
 }
 

@@ -96,8 +96,7 @@ Status RecordInput::perform_skip() {
     source_offset_ += left;
     return {};
   }
-  std::vector<std::uint8_t> scratch(
-      static_cast<std::size_t>(std::min<std::uint64_t>(left, kScanBytes)));
+  std::array<std::uint8_t, 16384> scratch;
   while (left > 0) {
     const auto step = static_cast<std::size_t>(std::min<std::uint64_t>(left, scratch.size()));
     auto got = read_source(std::span(scratch).first(step));

@@ -307,6 +307,11 @@ struct ChunkRecord {
   bool operator==(const ChunkRecord&) const = default;
 };
 
+/// Memory that a chunk's packets take, used or not.
+[[nodiscard]] inline std::size_t storage_bytes(const ChunkRecord& chunk) {
+  return chunk.data.capacity() + chunk.packets.capacity() * sizeof(Packet);
+}
+
 struct IndexRecord {
   struct Entry {
     std::uint32_t segment_index = 0;

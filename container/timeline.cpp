@@ -7,8 +7,9 @@ namespace relit::container {
 
 void Timeline::add(const SegmentRecord& segment) {
   if (even_) return;
-  Run run;
+  Run& run = runs_[segment.first_tick];
   run.first_frame = segment.first_frame;
+  run.starts.clear();
   run.starts.reserve(segment.frame_count + std::size_t{1});
   std::uint64_t tick = segment.first_tick;
   for (std::uint32_t i = 0; i < segment.frame_count; ++i) {
@@ -16,7 +17,6 @@ void Timeline::add(const SegmentRecord& segment) {
     tick += segment.durations.empty() ? 1 : segment.durations[i];
   }
   run.starts.push_back(tick);
-  runs_.insert_or_assign(segment.first_tick, std::move(run));
 }
 
 std::optional<std::uint64_t> Timeline::frame_at(std::uint64_t tick) const {

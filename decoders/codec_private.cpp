@@ -185,8 +185,9 @@ Status check_packet(std::string_view codec, std::span<const std::uint8_t> packet
   if (packet.empty()) return corrupt("an empty packet");
   if (NalSyntax::knows(codec)) {
     const NalSyntax syntax(codec);
-    RELIT_ASSIGN(const std::vector<Unit> units, split_lengths(syntax, packet));
-    for (const Unit unit : units) {
+    for (std::size_t at = 0; at < packet.size();) {
+      RELIT_ASSIGN(const Unit unit, unit_at(syntax, packet, at));
+      at = behind(unit, at);
       const UnitKind kind = syntax.kind(unit);
       if (kind != UnitKind::kRemark && is_remark_or_parameters(kind)) {
         return corrupt("parameter sets inside a packet; they belong into codec_private");

@@ -128,10 +128,14 @@ Status CompositeJob::validate() const {
     return fail(ErrorCode::kInvalid, "a light map of " + size_text(width, height) +
                                          " texels; sides are 1 to " + std::to_string(kSide));
   }
-  const std::size_t texels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  if (every != 1 && every != 2)
+    return fail(ErrorCode::kInvalid,
+                "every texel or every second one is composited, not " + std::to_string(every));
+  const std::size_t texels =
+      static_cast<std::size_t>(out_width()) * static_cast<std::size_t>(out_height());
   if (out.size() != 3 * texels) {
     return fail(ErrorCode::kInvalid, "the output has " + std::to_string(out.size()) + " floats; " +
-                                         size_text(width, height) + " texels need " +
+                                         size_text(out_width(), out_height()) + " texels need " +
                                          std::to_string(3 * texels));
   }
   RELIT_TRY(check_light(*this));

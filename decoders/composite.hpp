@@ -29,7 +29,8 @@ Status fold_light(const container::ModelRecord& model,
                   std::span<const container::LayerRecord> layers, const Light& light,
                   FoldedWeights& out);
 
-/// The composite, on the CPU: light map = s·E(N) + constant + Σ_k w[k]·value_k for every texel.
+/// The composite, on the CPU: light map = s·E(N) + constant + Σ_k w[k]·value_k for every texel. A
+/// blend of frames is the same sum over the planes of both, each with its share of the weight.
 ///
 /// All kernels give the same bits: float, planes added in order, no fused multiply-adds. Every
 /// 2^(E - E₀), subnormal ones included, and with it every value before its scale is exact, so that
@@ -45,9 +46,16 @@ struct CompositeJob {
   FoldedLight light;  ///< of `irradiance`, bands 0..2 are read: A_3 is 0
   int width = 0;      ///< of the light map; every plane covers it
   int height = 0;
-  std::span<const glm::vec3> normals;  ///< width × height, only with a prediction plane; finite
-  std::span<float>
-      out;  ///< [3][height][width], linear, divided by light.magnitude, may be negative
+  /// 1: every texel. 2: every second one of every second row, from (0, 0) on: a light map of half
+  /// the size, rounded up, whose texels are bit for bit those of the full one.
+  int every = 1;
+  std::span<const glm::vec3>
+      normals;           ///< of each texel of `out`, only with a prediction plane; finite
+  std::span<float> out;  ///< [3][out_height()][out_width()], linear, divided by light.magnitude,
+                         ///< may be negative
+
+  [[nodiscard]] int out_width() const { return (width + every - 1) / every; }
+  [[nodiscard]] int out_height() const { return (height + every - 1) / every; }
 
   /// Sizes, shifts and finiteness; call once per configuration. E₀ must be 128 to 150, where every
   /// 2^(E - E₀) is a float. Errors: kInvalid.

@@ -27,6 +27,15 @@ struct Avx2 {
 
   template <int kShift>
   RELIT_KERNEL static I load_samples(const std::uint8_t* p, std::uint8_t) {
+    if constexpr (kShift < 0) {
+      const __m128i both = _mm_loadu_si128(reinterpret_cast<const __m128i*>(p));
+      return _mm256_cvtepu16_epi32(_mm_and_si128(both, _mm_set1_epi16(0xFF)));
+    } else {
+      return repeat_bytes<kShift>(p);
+    }
+  }
+  template <int kShift>
+  RELIT_KERNEL static I repeat_bytes(const std::uint8_t* p) {
     std::uint64_t bytes = 0;
     __builtin_memcpy(&bytes, p, kLanes >> kShift);
     __m128i v = _mm_cvtsi64_si128(static_cast<long long>(bytes));
@@ -36,7 +45,10 @@ struct Avx2 {
   }
   template <int kShift>
   RELIT_KERNEL static I load_samples(const std::uint8_t* p, std::uint16_t) {
-    if constexpr (kShift == 0) {
+    if constexpr (kShift < 0) {
+      const __m256i both = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(p));
+      return _mm256_and_si256(both, _mm256_set1_epi32(0xFFFF));
+    } else if constexpr (kShift == 0) {
       return _mm256_cvtepu16_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(p)));
     } else {
       const __m128i v = _mm_loadl_epi64(reinterpret_cast<const __m128i*>(p));

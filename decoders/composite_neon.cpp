@@ -26,6 +26,15 @@ struct Neon {
 
   template <int kShift>
   static I load_samples(const std::uint8_t* p, std::uint8_t) {
+    if constexpr (kShift < 0) {
+      const uint16x4_t both = vreinterpret_u16_u8(vld1_u8(p));
+      return vreinterpretq_s32_u32(vmovl_u16(vand_u16(both, vdup_n_u16(0xFF))));
+    } else {
+      return repeat_bytes<kShift>(p);
+    }
+  }
+  template <int kShift>
+  static I repeat_bytes(const std::uint8_t* p) {
     std::uint32_t bytes = 0;
     __builtin_memcpy(&bytes, p, kLanes >> kShift);
     uint8x8_t v = vreinterpret_u8_u32(vdup_n_u32(bytes));
@@ -34,6 +43,15 @@ struct Neon {
   }
   template <int kShift>
   static I load_samples(const std::uint8_t* p, std::uint16_t) {
+    if constexpr (kShift < 0) {
+      const uint32x4_t both = vreinterpretq_u32_u8(vld1q_u8(p));
+      return vreinterpretq_s32_u32(vandq_u32(both, vdupq_n_u32(0xFFFF)));
+    } else {
+      return repeat_words<kShift>(p);
+    }
+  }
+  template <int kShift>
+  static I repeat_words(const std::uint8_t* p) {
     std::uint64_t words = 0;
     __builtin_memcpy(&words, p, std::size_t{2 * kLanes} >> kShift);
     uint16x4_t v = vcreate_u16(words);

@@ -26,6 +26,15 @@ struct Sse2 {
 
   template <int kShift>
   static I load_samples(const std::uint8_t* p, std::uint8_t) {
+    if constexpr (kShift < 0) {
+      const I both = _mm_loadl_epi64(reinterpret_cast<const I*>(p));
+      return _mm_unpacklo_epi16(_mm_and_si128(both, _mm_set1_epi16(0xFF)), _mm_setzero_si128());
+    } else {
+      return repeat_bytes<kShift>(p);
+    }
+  }
+  template <int kShift>
+  static I repeat_bytes(const std::uint8_t* p) {
     std::uint32_t bytes = 0;
     __builtin_memcpy(&bytes, p, kLanes >> kShift);
     I v = _mm_cvtsi32_si128(static_cast<int>(bytes));
@@ -35,6 +44,15 @@ struct Sse2 {
   }
   template <int kShift>
   static I load_samples(const std::uint8_t* p, std::uint16_t) {
+    if constexpr (kShift < 0) {
+      const I both = _mm_loadu_si128(reinterpret_cast<const I*>(p));
+      return _mm_and_si128(both, _mm_set1_epi32(0xFFFF));
+    } else {
+      return repeat_words<kShift>(p);
+    }
+  }
+  template <int kShift>
+  static I repeat_words(const std::uint8_t* p) {
     std::uint64_t words = 0;
     __builtin_memcpy(&words, p, std::size_t{2 * kLanes} >> kShift);
     I v = _mm_cvtsi64_si128(static_cast<long long>(words));

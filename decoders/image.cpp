@@ -197,7 +197,8 @@ Result<DecodedImage> to_rgba(const AVFrame& frame) {
   return image;
 }
 
-Result<DecodedImage> decode(std::span<const std::uint8_t> bytes, std::string_view media_type) {
+// `media_type`, what the container claims, is for the message alone.
+Result<Size> checked_size(std::span<const std::uint8_t> bytes, std::string_view media_type) {
   const std::string_view type = image_media_type(bytes);
   if (type != "image/png" && type != "image/jpeg") {
     const std::string_view told = type.empty() ? media_type : type;
@@ -210,6 +211,12 @@ Result<DecodedImage> decode(std::span<const std::uint8_t> bytes, std::string_vie
   }
   RELIT_ASSIGN(const Size size, type == "image/png" ? check_png(bytes) : check_jpeg(bytes));
   RELIT_TRY(check_size(size));
+  return size;
+}
+
+Result<DecodedImage> decode(std::span<const std::uint8_t> bytes, std::string_view media_type) {
+  RELIT_TRY(checked_size(bytes, media_type));
+  const std::string_view type = image_media_type(bytes);
   RELIT_ASSIGN(const ffmpeg::Frame frame, decode_frame(bytes, type));
   RELIT_TRY(check_size({frame->width, frame->height}));
   const AVPixFmtDescriptor* format = av_pix_fmt_desc_get(static_cast<AVPixelFormat>(frame->format));
@@ -231,6 +238,11 @@ std::string_view image_media_type(std::span<const std::uint8_t> bytes) {
     }
   }
   return {};
+}
+
+Result<ImageSize> image_size(std::span<const std::uint8_t> bytes) {
+  RELIT_ASSIGN(const Size size, checked_size(bytes, {}));
+  return ImageSize{static_cast<int>(size.width), static_cast<int>(size.height)};
 }
 
 Result<DecodedImage> decode_image(std::span<const std::uint8_t> bytes,

@@ -22,6 +22,15 @@ struct DecodedImage {
 /// "image/vnd-ms.dds"); empty: unknown.
 [[nodiscard]] std::string_view image_media_type(std::span<const std::uint8_t> bytes);
 
+struct ImageSize {
+  int width = 0;
+  int height = 0;
+};
+
+/// The size of a PNG or a JPEG, by its headers alone: nothing is decoded or allocated. Errors: as
+/// decode_image()'s.
+[[nodiscard]] Result<ImageSize> image_size(std::span<const std::uint8_t> bytes);
+
 /// Decodes a PNG (any colour type and depth; 16 bits become 8) or a JPEG (baseline or progressive,
 /// grey or YCbCr). `media_type` is what the container of the bytes claims ("image/png",
 /// "image/jpeg" or empty); the bytes themselves decide. Colour profiles, gamma chunks and

@@ -24,16 +24,16 @@ Result<std::size_t> stated_size(std::span<const std::uint8_t> bytes, std::string
   return static_cast<std::size_t>(size);
 }
 
-Result<std::vector<std::uint8_t>> decompress(std::span<const std::uint8_t> bytes, std::size_t size,
-                                             std::string_view what) {
-  std::vector<std::uint8_t> out(size);
+Status decompress(std::span<const std::uint8_t> bytes, std::size_t size, std::string_view what,
+                  std::vector<std::uint8_t>& out) {
+  out.resize(size);
   const std::size_t written = ZSTD_decompress(out.data(), out.size(), bytes.data(), bytes.size());
   if (ZSTD_isError(written) || written != size) {
     return fail(ErrorCode::kCorrupt,
                 std::string(what) + ": zstd data damaged" +
                     (ZSTD_isError(written) ? std::string(": ") + ZSTD_getErrorName(written) : ""));
   }
-  return out;
+  return {};
 }
 
 }  // namespace
@@ -46,18 +46,27 @@ Result<std::vector<std::uint8_t>> inflate(std::span<const std::uint8_t> bytes,
                                        " bytes, at most " + std::to_string(max_bytes) +
                                        " are allowed");
   }
-  return decompress(bytes, size, what);
+  std::vector<std::uint8_t> out;
+  RELIT_TRY(decompress(bytes, size, what, out));
+  return out;
 }
 
 Result<std::vector<std::uint8_t>> inflate_exact(std::span<const std::uint8_t> bytes,
                                                 std::size_t exact_bytes, std::string_view what) {
+  std::vector<std::uint8_t> out;
+  RELIT_TRY(inflate_exact_into(bytes, exact_bytes, what, out));
+  return out;
+}
+
+Status inflate_exact_into(std::span<const std::uint8_t> bytes, std::size_t exact_bytes,
+                          std::string_view what, std::vector<std::uint8_t>& out) {
   RELIT_ASSIGN(const std::size_t size, stated_size(bytes, what));
   if (size != exact_bytes) {
     return fail(ErrorCode::kCorrupt, std::string(what) + ": decompresses to " +
                                          std::to_string(size) + " bytes instead of " +
                                          std::to_string(exact_bytes));
   }
-  return decompress(bytes, size, what);
+  return decompress(bytes, size, what, out);
 }
 
 }  // namespace relit::decoders

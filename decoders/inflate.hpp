@@ -23,5 +23,9 @@ namespace relit::decoders {
 [[nodiscard]] Result<std::vector<std::uint8_t>> inflate_exact(std::span<const std::uint8_t> bytes,
                                                               std::size_t exact_bytes,
                                                               std::string_view what);
+/// The same into a vector whose storage is used again; what it holds after an error is undefined.
+[[nodiscard]] Status inflate_exact_into(std::span<const std::uint8_t> bytes,
+                                        std::size_t exact_bytes, std::string_view what,
+                                        std::vector<std::uint8_t>& out);
 
 }  // namespace relit::decoders

@@ -157,18 +157,26 @@ std::vector<Unit> split_annex_b(std::span<const std::uint8_t> stream) {
 Result<std::vector<Unit>> split_lengths(const NalSyntax& syntax,
                                         std::span<const std::uint8_t> packet) {
   std::vector<Unit> units;
-  RecordReader r(packet);
-  for (std::size_t used = 0; used < packet.size();) {
-    const Unit unit = r.take(r.number(kLengthBytes));
-    if (r.failed() || unit.size() < syntax.header_bytes()) {
-      return corrupt("the NAL unit at byte " + std::to_string(used) +
-                     " of the packet has no length of 4 bytes that fits");
-    }
+  for (std::size_t at = 0; at < packet.size();) {
+    RELIT_ASSIGN(const Unit unit, unit_at(syntax, packet, at));
     units.push_back(unit);
-    used += kLengthBytes + unit.size();
+    at = behind(unit, at);
   }
   return units;
 }
+
+Result<Unit> unit_at(const NalSyntax& syntax, std::span<const std::uint8_t> packet,
+                     std::size_t at) {
+  RecordReader r(packet.subspan(at));
+  const Unit unit = r.take(r.number(kLengthBytes));
+  if (r.failed() || unit.size() < syntax.header_bytes()) {
+    return corrupt("the NAL unit at byte " + std::to_string(at) +
+                   " of the packet has no length of 4 bytes that fits");
+  }
+  return unit;
+}
+
+std::size_t behind(const Unit& unit, std::size_t at) { return at + kLengthBytes + unit.size(); }
 
 Result<std::vector<std::uint8_t>> make_avcc(std::span<const Unit> units) {
   const NalSyntax syntax("h264");

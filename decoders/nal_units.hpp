@@ -50,6 +50,12 @@ class NalSyntax {
 [[nodiscard]] Result<std::vector<Unit>> split_lengths(const NalSyntax& syntax,
                                                       std::span<const std::uint8_t> packet);
 
+/// The unit of a stored packet that begins at byte `at`. Errors: as split_lengths().
+[[nodiscard]] Result<Unit> unit_at(const NalSyntax& syntax, std::span<const std::uint8_t> packet,
+                                   std::size_t at);
+/// Where the unit behind one that begins at `at` does.
+[[nodiscard]] std::size_t behind(const Unit& unit, std::size_t at);
+
 /// Parameter sets -> the record, with lengths of 4 bytes. Errors: kCorrupt where a kind is missing,
 /// more numerous or longer than the record can say, or does not parse.
 [[nodiscard]] Result<std::vector<std::uint8_t>> make_avcc(std::span<const Unit> units);

@@ -142,13 +142,31 @@ void FrameView::clear() {
   for (VideoFrame& picture : pictures_) picture.clear();
 }
 
+void FrameView::reset(std::uint64_t frame, std::size_t planes, std::size_t layers) {
+  planes_.resize(planes);
+  pictures_.resize(2 * layers);
+  clear();
+  frame_ = frame;
+}
+
+void FrameView::show(const LayerRecord& record, std::size_t first_plane, std::size_t layer,
+                     VideoFrame& mantissas, VideoFrame* exponents) {
+  std::swap(pictures_[2 * layer], mantissas);
+  if (exponents != nullptr) std::swap(pictures_[2 * layer + 1], *exponents);
+  for (std::size_t k = 0; k < record.planes.size(); ++k) {
+    planes_[first_plane + k] =
+        view_plane(record, record.planes[k], pictures_[2 * layer],
+                   exponents != nullptr ? &pictures_[2 * layer + 1] : nullptr);
+  }
+}
+
 Result<LayerDecoder> LayerDecoder::open(const ModelRecord& model, const LayerRecord& layer,
-                                        int threads) {
+                                        const VideoDecoderOptions& options) {
   RELIT_TRY(check_layer(model, layer));
-  RELIT_ASSIGN(TrackDecoder mantissas, TrackDecoder::open(mantissa_format(layer), threads));
+  RELIT_ASSIGN(TrackDecoder mantissas, TrackDecoder::open(mantissa_format(layer), options));
   LayerDecoder decoder(layer, std::move(mantissas));
   if (layer.has_exponents) {
-    RELIT_ASSIGN(TrackDecoder exponents, TrackDecoder::open(exponent_format(layer), 1));
+    RELIT_ASSIGN(TrackDecoder exponents, TrackDecoder::open(exponent_format(layer)));
     decoder.exponents_.emplace(std::move(exponents));
   }
   return decoder;
@@ -194,6 +212,11 @@ void LayerDecoder::forget_before(std::uint64_t frame) {
   if (exponents_) exponents_->forget_before(frame);
 }
 
+void LayerDecoder::forget_all() {
+  mantissas_.forget_all();
+  if (exponents_) exponents_->forget_all();
+}
+
 Result<PlaneDecoder> PlaneDecoder::open(const ModelRecord& model,
                                         std::span<const LayerRecord> layers,
                                         const PlaneDecoderOptions& options) {
@@ -212,7 +235,9 @@ Result<PlaneDecoder> PlaneDecoder::open(const ModelRecord& model,
       }
       decoder.layers_.emplace_back();
       if (!options.wanted.empty() && !options.wanted[i]) continue;
-      RELIT_ASSIGN(LayerDecoder layer, LayerDecoder::open(model, layers[i], options.threads));
+      RELIT_ASSIGN(
+          LayerDecoder layer,
+          LayerDecoder::open(model, layers[i], {options.threads, options.decoder, nullptr}));
       decoder.layers_.back().emplace(std::move(layer));
     }
     return decoder;
@@ -270,6 +295,12 @@ Result<FrameView> PlaneDecoder::frame(std::uint64_t frame_index) {
 void PlaneDecoder::forget_before(std::uint64_t frame) {
   for (std::optional<LayerDecoder>& layer : layers_) {
     if (layer) layer->forget_before(frame);
+  }
+}
+
+void PlaneDecoder::forget_all() {
+  for (std::optional<LayerDecoder>& layer : layers_) {
+    if (layer) layer->forget_all();
   }
 }
 

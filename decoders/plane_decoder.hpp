@@ -22,10 +22,21 @@ namespace relit::decoders {
 /// from frame to frame, so that nothing is allocated.
 class FrameView {
  public:
+  FrameView() = default;
+  /// Of planes that the caller owns and keeps, as from a decoder of a host's own.
+  FrameView(std::uint64_t frame, std::vector<PlaneView> planes)
+      : frame_(frame), planes_(std::move(planes)) {}
   [[nodiscard]] std::span<const PlaneView> planes() const { return planes_; }
   [[nodiscard]] std::uint64_t frame() const { return frame_; }
   /// Gives the pictures back to their decoders; all views become empty.
   void clear();
+
+  /// Makes room for a frame whose views are all empty.
+  void reset(std::uint64_t frame, std::size_t planes, std::size_t layers);
+  /// Takes over a layer's pictures and leaves those it had, or empty ones: its planes begin at
+  /// `first_plane`, its number is `layer`. `exponents` is null where the layer has none.
+  void show(const container::LayerRecord& record, std::size_t first_plane, std::size_t layer,
+            VideoFrame& mantissas, VideoFrame* exponents);
 
  private:
   friend class LayerDecoder;
@@ -61,7 +72,8 @@ class FrameView {
 /// when frames are asked for one after another. Not thread-safe.
 class TrackDecoder {
  public:
-  static Result<TrackDecoder> open(const VideoFormat& format, int threads);
+  static Result<TrackDecoder> open(const VideoFormat& format,
+                                   const VideoDecoderOptions& options = {});
 
   /// Takes the packets of one segment. Errors: kCorrupt when ranges or time stamps are not the
   /// segment's; a chunk that is already there is replaced.
@@ -73,7 +85,13 @@ class TrackDecoder {
   /// decodable.
   Result<const VideoFrame*> picture(std::uint64_t frame);
 
+  /// Keeps this chunk alone; `chunk` gets the storage of one that was kept before. So chunk after
+  /// chunk is taken without an allocation. Errors: as add_chunk(); no chunk is here then.
+  Status replace_chunk(const container::SegmentRecord& segment, container::ChunkRecord& chunk);
+
   void forget_before(std::uint64_t frame);
+  void forget_all();
+  [[nodiscard]] const VideoDecoder& decoder() const { return decoder_; }
   [[nodiscard]] bool has_segment_of(std::uint64_t frame) const;
 
  private:
@@ -86,6 +104,10 @@ class TrackDecoder {
 
   TrackDecoder(VideoDecoder decoder, std::uint32_t track_id, int threads)
       : decoder_(std::move(decoder)), track_id_(track_id), threads_(threads) {}
+  Status list_shown(const container::SegmentRecord& segment, const container::ChunkRecord& chunk,
+                    std::vector<std::int64_t>& shown) const;
+  /// Whether `current_` is now the picture of that pts.
+  bool decode_until(const Chunk& chunk, std::int64_t pts);
   [[nodiscard]] Chunks::const_iterator find(std::uint64_t frame) const;
   void restart(std::uint64_t first_frame);
   /// Makes `ahead_` the next picture of the chunk; leaves it empty at the end.
@@ -112,7 +134,8 @@ class LayerDecoder {
  public:
   /// Checks the layer as check_layer() does and opens its decoders.
   static Result<LayerDecoder> open(const container::ModelRecord& model,
-                                   const container::LayerRecord& layer, int threads = 1);
+                                   const container::LayerRecord& layer,
+                                   const VideoDecoderOptions& options = {});
 
   /// Takes a chunk of either of the layer's tracks; kNotFound for one of other tracks.
   Status add_chunk(const container::SegmentRecord& segment, container::ChunkRecord chunk);
@@ -122,6 +145,7 @@ class LayerDecoder {
   Status decode(std::uint64_t frame, std::size_t first, std::size_t slot, FrameView& out);
 
   void forget_before(std::uint64_t frame);
+  void forget_all();
   [[nodiscard]] std::size_t plane_count() const { return layer_.planes.size(); }
   [[nodiscard]] const container::LayerRecord& record() const { return layer_; }
 
@@ -135,8 +159,9 @@ class LayerDecoder {
 };
 
 struct PlaneDecoderOptions {
-  int threads = 1;                       ///< of each mantissa decoder, see VideoDecoder::open()
+  int threads = 1;                       ///< of each mantissa decoder, see VideoDecoderOptions
   std::span<const std::uint8_t> wanted;  ///< by layer, 0: neither opened nor decoded; empty: all
+  std::string decoder = {};              ///< VideoDecoderOptions::name
 };
 
 /// All wanted layers of one model on the caller's thread. Not thread-safe.
@@ -161,6 +186,7 @@ class PlaneDecoder {
 
   /// Frees the chunks of segments that end at or before `frame`.
   void forget_before(std::uint64_t frame);
+  void forget_all();
 
   [[nodiscard]] std::size_t plane_count() const { return plane_count_; }
 

@@ -250,17 +250,19 @@ Status PoseTrack::add_packet(std::span<const std::uint8_t> packet, std::uint64_t
 
 Status PoseTrack::add_segment(std::span<const std::uint8_t> packet, std::uint64_t first_frame,
                               std::uint32_t frame_count) {
-  const std::string where =
-      "pose track " + std::to_string(track_.track_id) + ", frame " + std::to_string(first_frame);
+  const auto where = [&] {
+    return "pose track " + std::to_string(track_.track_id) + ", frame " +
+           std::to_string(first_frame);
+  };
   if (frame_count == 0 || frame_count > limits::kFramesPerSegment ||
       first_frame > limits::kFrames - frame_count) {
-    return fail(ErrorCode::kLimit, where + ": a segment of " + std::to_string(frame_count) +
+    return fail(ErrorCode::kLimit, where() + ": a segment of " + std::to_string(frame_count) +
                                        " frames; 1 to " +
                                        std::to_string(limits::kFramesPerSegment) + " are allowed");
   }
   const PosePacketShape shape{values_per_frame_, frame_count, track_.kind};
   if (values_per_frame_ > limits::kDecompressedBytes / 2 / frame_count - 1) {
-    return fail(ErrorCode::kLimit, where + ": " + std::to_string(frame_count) + " frames of " +
+    return fail(ErrorCode::kLimit, where() + ": " + std::to_string(frame_count) + " frames of " +
                                        std::to_string(values_per_frame_) +
                                        " values are more than a stream may hold");
   }
@@ -273,23 +275,51 @@ Status PoseTrack::add_segment(std::span<const std::uint8_t> packet, std::uint64_
   const bool into_last = next != segments_.begin() &&
                          std::prev(next)->first_frame + std::prev(next)->frame_count > first_frame;
   if (into_next || into_last) {
-    return fail(ErrorCode::kCorrupt,
-                where + ": its " + std::to_string(frame_count) + " frames overlap another segment");
+    return fail(ErrorCode::kCorrupt, where() + ": its " + std::to_string(frame_count) +
+                                         " frames overlap another segment");
   }
-  auto values = decode_pose_packet(packet, shape);
-  if (!values) return fail(values.error().code, where + ": " + values.error().message);
+  std::vector<std::uint16_t> values = take_spare();
+  if (const Status decoded = decode_pose_packet(packet, shape, bytes_, values); !decoded) {
+    return fail(decoded.error().code, where() + ": " + decoded.error().message);
+  }
   if (replaces) {
-    *next = Segment{first_frame, frame_count, std::move(*values)};
+    std::swap(next->values, values);
+    next->frame_count = frame_count;
+    spare_.push_back(std::move(values));
   } else {
-    segments_.insert(next, Segment{first_frame, frame_count, std::move(*values)});
+    segments_.insert(next, Segment{first_frame, frame_count, std::move(values)});
   }
   return {};
 }
 
+std::vector<std::uint16_t> PoseTrack::take_spare() {
+  if (spare_.empty()) return {};
+  std::vector<std::uint16_t> values = std::move(spare_.back());
+  spare_.pop_back();
+  return values;
+}
+
+template <class Predicate>
+void PoseTrack::forget_if(Predicate&& forgotten) {
+  constexpr std::size_t kMostSpares = 2;
+  for (Segment& segment : segments_) {
+    if (!forgotten(segment)) continue;
+    if (spare_.size() < kMostSpares) spare_.push_back(std::move(segment.values));
+  }
+  std::erase_if(segments_, forgotten);
+}
+
 void PoseTrack::forget_before(std::uint64_t frame) {
-  std::erase_if(segments_, [&](const Segment& segment) {
-    return segment.first_frame + segment.frame_count <= frame;
-  });
+  forget_if(
+      [&](const Segment& segment) { return segment.first_frame + segment.frame_count <= frame; });
+}
+
+void PoseTrack::forget_all() {
+  forget_if([](const Segment&) { return true; });
+}
+
+void PoseTrack::forget_except(std::uint64_t first_frame) {
+  forget_if([&](const Segment& segment) { return segment.first_frame != first_frame; });
 }
 
 std::size_t PoseTrack::memory_bytes() const {

@@ -41,6 +41,9 @@ class PoseTrack {
 
   /// Frees the segments that end at or before `frame`.
   void forget_before(std::uint64_t frame);
+  void forget_all();
+  /// Frees all segments but the one that begins with `first_frame`.
+  void forget_except(std::uint64_t first_frame);
 
   /// The pose at `frame` (fractions interpolate: rotations by normalised lerp on the shorter arc,
   /// the rest linearly), written into `pose`. A negative frame is frame 0. Allocates nothing once
@@ -77,6 +80,9 @@ class PoseTrack {
 
   PoseTrack() = default;
   Status plan(std::span<const Mesh> meshes);
+  template <class Predicate>
+  void forget_if(Predicate&& forgotten);
+  [[nodiscard]] std::vector<std::uint16_t> take_spare();
   Status add_segment(std::span<const std::uint8_t> packet, std::uint64_t first_frame,
                      std::uint32_t frame_count);
   Status sample_at(double frame, Pose& pose) const;
@@ -96,7 +102,9 @@ class PoseTrack {
   std::vector<std::size_t> channel_offsets_;  ///< of each channel's first value within a frame
   std::vector<std::uint32_t> vertex_counts_;
   std::size_t values_per_frame_ = 0;
-  std::vector<Segment> segments_;  ///< by first frame, without overlap
+  std::vector<Segment> segments_;                  ///< by first frame, without overlap
+  std::vector<std::vector<std::uint16_t>> spare_;  ///< storage of segments that are gone
+  std::vector<std::uint8_t> bytes_;                ///< of a packet that is being decoded
 };
 
 /// Posed positions, and normals where `normals` is not empty, in model space. `mesh_index` selects

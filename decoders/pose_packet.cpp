@@ -44,10 +44,9 @@ std::uint16_t predict_pose_value(std::uint8_t mode, const PosePacketShape& shape
   return static_cast<std::uint16_t>(prediction);
 }
 
-Result<std::vector<std::uint16_t>> decode_pose_packet(std::span<const std::uint8_t> packet,
-                                                      const PosePacketShape& shape) {
-  RELIT_ASSIGN(const std::vector<std::uint8_t> bytes,
-               inflate_exact(packet, pose_packet_bytes(shape), "pose packet"));
+Status decode_pose_packet(std::span<const std::uint8_t> packet, const PosePacketShape& shape,
+                          std::vector<std::uint8_t>& bytes, std::vector<std::uint16_t>& values) {
+  RELIT_TRY(inflate_exact_into(packet, pose_packet_bytes(shape), "pose packet", bytes));
   const std::uint8_t mode = bytes[0];
   if (!valid_pose_mode(mode, shape.kind)) {
     return fail(ErrorCode::kCorrupt,
@@ -56,7 +55,7 @@ Result<std::vector<std::uint16_t>> decode_pose_packet(std::span<const std::uint8
   const std::size_t count = shape.values * shape.frames;
   const std::uint8_t* low = bytes.data() + 1;
   const std::uint8_t* high = low + count;
-  std::vector<std::uint16_t> values(count);
+  values.resize(count);
   for (std::size_t t = 0; t < shape.frames; ++t) {
     for (std::size_t v = 0; v < shape.values; ++v) {
       const std::size_t at = pose_residual_index(shape, t, v);
@@ -66,7 +65,7 @@ Result<std::vector<std::uint16_t>> decode_pose_packet(std::span<const std::uint8
       values[t * shape.values + v] = static_cast<std::uint16_t>(prediction + residual);
     }
   }
-  return values;
+  return {};
 }
 
 }  // namespace relit::decoders

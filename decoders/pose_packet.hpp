@@ -46,9 +46,12 @@ inline constexpr std::uint8_t kPoseAlongVertices = 4;
   return 1 + 2 * shape.values * shape.frames;
 }
 
-/// Decodes a packet to [frames][values]. The shape has been checked against the limits.
-/// Errors: kCorrupt.
-[[nodiscard]] Result<std::vector<std::uint16_t>> decode_pose_packet(
-    std::span<const std::uint8_t> packet, const PosePacketShape& shape);
+/// Decodes a packet to [frames][values]. The shape has been checked against the limits. `bytes` is
+/// working memory; both vectors' storage is used again. Errors: kCorrupt, and `values` is
+/// undefined.
+[[nodiscard]] Status decode_pose_packet(std::span<const std::uint8_t> packet,
+                                        const PosePacketShape& shape,
+                                        std::vector<std::uint8_t>& bytes,
+                                        std::vector<std::uint16_t>& values);
 
 }  // namespace relit::decoders

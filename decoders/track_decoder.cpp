@@ -8,45 +8,74 @@
 
 namespace relit::decoders {
 
-Result<TrackDecoder> TrackDecoder::open(const VideoFormat& format, int threads) {
-  RELIT_ASSIGN(VideoDecoder video, VideoDecoder::open(format, threads));
-  return TrackDecoder(std::move(video), format.track_id, threads);
+Result<TrackDecoder> TrackDecoder::open(const VideoFormat& format,
+                                        const VideoDecoderOptions& options) {
+  RELIT_ASSIGN(VideoDecoder video, VideoDecoder::open(format, options));
+  return TrackDecoder(std::move(video), format.track_id, options.threads);
+}
+
+/// Checks the packets and notes when they are shown.
+Status TrackDecoder::list_shown(const container::SegmentRecord& segment,
+                                const container::ChunkRecord& chunk,
+                                std::vector<std::int64_t>& shown) const {
+  const auto where = [&] {
+    return "track " + std::to_string(track_id_) + ", segment " + std::to_string(segment.index) +
+           ": ";
+  };
+  shown.clear();
+  if (segment.frame_count == 0 || segment.frame_count > limits::kFramesPerSegment ||
+      segment.first_frame > limits::kFrames || chunk.packets.size() > limits::kPacketsPerChunk) {
+    return fail(ErrorCode::kLimit, where() + "too many frames or packets, or none");
+  }
+  const std::uint64_t end_frame = segment.first_frame + segment.frame_count;
+  for (const container::Packet& packet : chunk.packets) {
+    if (packet.size > chunk.data.size() || packet.offset > chunk.data.size() - packet.size) {
+      return fail(ErrorCode::kCorrupt, where() + "a packet reaches outside its chunk");
+    }
+    if (packet.pts < static_cast<std::int64_t>(segment.first_frame) ||
+        packet.pts >= static_cast<std::int64_t>(end_frame)) {
+      return fail(ErrorCode::kCorrupt, where() + "a packet of frame " + std::to_string(packet.pts) +
+                                           " is outside the segment's frames");
+    }
+    shown.push_back(packet.pts);
+  }
+  std::sort(shown.begin(), shown.end());
+  if (std::adjacent_find(shown.begin(), shown.end()) != shown.end()) {
+    return fail(ErrorCode::kCorrupt, where() + "two packets of one frame");
+  }
+  return {};
 }
 
 Status TrackDecoder::add_chunk(const container::SegmentRecord& segment,
                                container::ChunkRecord chunk) {
-  const std::string where =
-      "track " + std::to_string(track_id_) + ", segment " + std::to_string(segment.index) + ": ";
-  if (segment.frame_count == 0 || segment.frame_count > limits::kFramesPerSegment ||
-      segment.first_frame > limits::kFrames || chunk.packets.size() > limits::kPacketsPerChunk) {
-    return fail(ErrorCode::kLimit, where + "too many frames or packets, or none");
-  }
   Chunk stored;
+  RELIT_TRY(list_shown(segment, chunk, stored.shown));
   stored.end_frame = segment.first_frame + segment.frame_count;
-  for (const container::Packet& packet : chunk.packets) {
-    if (packet.size > chunk.data.size() || packet.offset > chunk.data.size() - packet.size) {
-      return fail(ErrorCode::kCorrupt, where + "a packet reaches outside its chunk");
-    }
-    if (packet.pts < static_cast<std::int64_t>(segment.first_frame) ||
-        packet.pts >= static_cast<std::int64_t>(stored.end_frame)) {
-      return fail(ErrorCode::kCorrupt, where + "a packet of frame " + std::to_string(packet.pts) +
-                                           " is outside the segment's frames");
-    }
-    stored.shown.push_back(packet.pts);
-  }
-  std::sort(stored.shown.begin(), stored.shown.end());
-  if (std::adjacent_find(stored.shown.begin(), stored.shown.end()) != stored.shown.end()) {
-    return fail(ErrorCode::kCorrupt, where + "two packets of one frame");
-  }
   const auto next = chunks_.lower_bound(segment.first_frame);
   if ((next != chunks_.end() && next->first != segment.first_frame &&
        next->first < stored.end_frame) ||
       (next != chunks_.begin() && std::prev(next)->second.end_frame > segment.first_frame)) {
-    return fail(ErrorCode::kCorrupt, where + "its frames overlap those of another segment");
+    return fail(ErrorCode::kCorrupt, "track " + std::to_string(track_id_) + ", segment " +
+                                         std::to_string(segment.index) +
+                                         ": its frames overlap those of another segment");
   }
   if (segment_ == segment.first_frame) segment_.reset();
   stored.record = std::move(chunk);
   chunks_.insert_or_assign(segment.first_frame, std::move(stored));
+  return {};
+}
+
+Status TrackDecoder::replace_chunk(const container::SegmentRecord& segment,
+                                   container::ChunkRecord& chunk) {
+  segment_.reset();
+  while (chunks_.size() > 1) chunks_.erase(chunks_.begin());
+  if (chunks_.empty()) chunks_.try_emplace(0);
+  auto node = chunks_.extract(chunks_.begin());
+  std::swap(node.mapped().record, chunk);
+  RELIT_TRY(list_shown(segment, node.mapped().record, node.mapped().shown));
+  node.key() = segment.first_frame;
+  node.mapped().end_frame = segment.first_frame + segment.frame_count;
+  chunks_.insert(std::move(node));
   return {};
 }
 
@@ -154,34 +183,48 @@ void TrackDecoder::advance(const Chunk& chunk) {
   ahead_.clear();
 }
 
+bool TrackDecoder::decode_until(const Chunk& chunk, std::int64_t pts) {
+  while (current_.empty() || current_.pts() < pts) {
+    if (ahead_.empty()) advance(chunk);
+    if (ahead_.empty() || ahead_.pts() > pts) break;
+    current_ = std::move(ahead_);
+    ahead_.clear();
+  }
+  return !current_.empty() && current_.pts() == pts;
+}
+
 Result<const VideoFrame*> TrackDecoder::picture(std::uint64_t frame) {
-  const std::string where =
-      "track " + std::to_string(track_id_) + ", frame " + std::to_string(frame) + ": ";
+  const auto where = [&] {
+    return "track " + std::to_string(track_id_) + ", frame " + std::to_string(frame) + ": ";
+  };
   const auto found = find(frame);
   if (found == chunks_.end()) {
-    return fail(ErrorCode::kNotFound, where + "its segment is not here");
+    return fail(ErrorCode::kNotFound, where() + "its segment is not here");
   }
   const Chunk& chunk = found->second;
   const auto wanted = static_cast<std::int64_t>(frame);
   const auto after = std::upper_bound(chunk.shown.begin(), chunk.shown.end(), wanted);
   if (after == chunk.shown.begin()) {
-    return fail(ErrorCode::kCorrupt, where + "no packet at or before it in its segment");
+    return fail(ErrorCode::kCorrupt, where() + "no packet at or before it in its segment");
   }
   const std::int64_t expected = *std::prev(after);
   if (segment_ != found->first || (!current_.empty() && current_.pts() > expected)) {
     restart(found->first);
   }
-  while (current_.empty() || current_.pts() < expected) {
-    if (ahead_.empty()) advance(chunk);
-    if (ahead_.empty() || ahead_.pts() > expected) break;
-    current_ = std::move(ahead_);
-    ahead_.clear();
+  if (decode_until(chunk, expected)) return &current_;
+  if (decoder_.fell_back()) {
+    restart(found->first);
+    if (decode_until(chunk, expected)) return &current_;
   }
-  if (current_.empty() || current_.pts() != expected) {
-    return fail(ErrorCode::kCorrupt,
-                where + "lost" + (damage_ ? " (" + damage_->message + ")" : ""));
-  }
-  return &current_;
+  return fail(ErrorCode::kCorrupt,
+              where() + "lost" + (damage_ ? " (" + damage_->message + ")" : ""));
+}
+
+void TrackDecoder::forget_all() {
+  segment_.reset();
+  chunks_.clear();
+  current_.clear();
+  ahead_.clear();
 }
 
 void TrackDecoder::forget_before(std::uint64_t frame) {

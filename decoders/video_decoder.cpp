@@ -48,18 +48,7 @@ bool acceptable(const VideoFormat& format, AVPixelFormat pixel) {
          d->log2_chroma_w == shift && d->log2_chroma_h == shift;
 }
 
-AVPixelFormat choose_format(AVCodecContext* context, const AVPixelFormat* offered) {
-  VideoFormat format;
-  const auto packed = reinterpret_cast<std::intptr_t>(context->opaque);
-  format.bit_depth = static_cast<int>(packed >> 8);
-  format.chroma = static_cast<container::Chroma>(packed & 0xff);
-  for (; *offered != AV_PIX_FMT_NONE; ++offered) {
-    if (acceptable(format, *offered)) return *offered;
-  }
-  return AV_PIX_FMT_NONE;
-}
-
-const AVCodec* find_decoder(std::string_view name) {
+const AVCodec* find_software(std::string_view name) {
   if (std::find(kCodecs.begin(), kCodecs.end(), name) == kCodecs.end()) return nullptr;
   const AVCodecDescriptor* descriptor = avcodec_descriptor_get_by_name(std::string(name).c_str());
   if (descriptor == nullptr) return nullptr;
@@ -167,41 +156,120 @@ SampleView VideoFrame::component(int index) const {
   return view;
 }
 
+std::size_t VideoFrame::buffer_bytes() const {
+  std::size_t bytes = 0;
+  for (const AVBufferRef* buffer : frame_->buf) bytes += buffer != nullptr ? buffer->size : 0;
+  return bytes;
+}
+
+bool VideoFrame::same_picture(const VideoFrame& other) const {
+  return !empty() && !other.empty() && frame_->data[0] == other.frame_->data[0];
+}
+
+struct VideoDecoder::Hooks {
+  int bit_depth = 8;
+  container::Chroma chroma = container::Chroma::kLuma;
+  std::shared_ptr<PicturePool> pool;
+
+  static AVPixelFormat choose_format(AVCodecContext* context, const AVPixelFormat* offered) {
+    const auto* hooks = static_cast<const Hooks*>(context->opaque);
+    VideoFormat format;
+    format.bit_depth = hooks->bit_depth;
+    format.chroma = hooks->chroma;
+    for (; *offered != AV_PIX_FMT_NONE; ++offered) {
+      if (acceptable(format, *offered)) return *offered;
+    }
+    return AV_PIX_FMT_NONE;
+  }
+
+  static int get_buffer(AVCodecContext* context, AVFrame* frame, int flags) {
+    return static_cast<Hooks*>(context->opaque)->pool->get_buffer(*context, *frame, flags);
+  }
+};
+
+VideoDecoder::VideoDecoder() = default;
 VideoDecoder::VideoDecoder(VideoDecoder&&) noexcept = default;
-VideoDecoder& VideoDecoder::operator=(VideoDecoder&&) noexcept = default;
 VideoDecoder::~VideoDecoder() = default;
 
-Result<VideoDecoder> VideoDecoder::open(const VideoFormat& format, int threads) {
+VideoDecoder& VideoDecoder::operator=(VideoDecoder&& other) noexcept {
+  // libavcodec's threads may call the hooks until their context is gone.
+  context_ = std::move(other.context_);
+  hooks_ = std::move(other.hooks_);
+  packet_ = std::move(other.packet_);
+  format_ = std::move(other.format_);
+  options_ = std::move(other.options_);
+  named_ = other.named_;
+  proven_ = other.proven_;
+  note_ = std::move(other.note_);
+  return *this;
+}
+
+const PicturePool& VideoDecoder::pool() const { return *hooks_->pool; }
+
+Result<VideoDecoder> VideoDecoder::open(const VideoFormat& format,
+                                        const VideoDecoderOptions& options) {
   RELIT_TRY(check_format(format));
-  const AVCodec* codec = find_decoder(format.codec);
-  if (codec == nullptr) {
+  const AVCodec* software = find_software(format.codec);
+  if (software == nullptr) {
     return fail(ErrorCode::kUnsupported, track_name(format) +
                                              ": no such decoder here; known are h264, hevc, mpeg4, "
                                              "ffv1, vp9 and av1, as far as libavcodec has them");
   }
+  if (options.name.empty()) return open_codec(format, options, *software);
+  const AVCodec* named = avcodec_find_decoder_by_name(options.name.c_str());
+  if (named != nullptr && named->id != software->id) return open_codec(format, options, *software);
+  std::string why = "libavcodec here has no such decoder";
+  if (named != nullptr) {
+    auto decoder = open_codec(format, options, *named);
+    if (decoder) {
+      decoder->named_ = true;
+      return decoder;
+    }
+    why = decoder.error().message;
+  }
+  RELIT_ASSIGN(VideoDecoder decoder, open_codec(format, options, *software));
+  decoder.note_ = track_name(format) + ": " + options.name + " is not used, software is: " + why;
+  return decoder;
+}
+
+Status VideoDecoder::copy_private() {
+  AVCodecContext& context = *context_;
+  const auto& bytes = format_.codec_private;
+  if (bytes.empty()) return {};
+  context.extradata =
+      static_cast<std::uint8_t*>(av_mallocz(bytes.size() + AV_INPUT_BUFFER_PADDING_SIZE));
+  if (context.extradata == nullptr) {
+    return fail(ErrorCode::kOutOfMemory, track_name(format_) + ": no memory for codec_private");
+  }
+  std::copy(bytes.begin(), bytes.end(), context.extradata);
+  context.extradata_size = static_cast<int>(bytes.size());
+  return {};
+}
+
+Result<VideoDecoder> VideoDecoder::open_codec(const VideoFormat& format,
+                                              const VideoDecoderOptions& options,
+                                              const AVCodec& codec) {
   VideoDecoder decoder;
-  decoder.context_.reset(avcodec_alloc_context3(codec));
+  decoder.format_ = format;
+  decoder.options_ = options;
+  decoder.context_.reset(avcodec_alloc_context3(&codec));
   decoder.packet_.reset(av_packet_alloc());
   if (!decoder.context_ || !decoder.packet_) {
     return fail(ErrorCode::kOutOfMemory, track_name(format) + ": no memory for a decoder");
   }
+  RELIT_TRY(decoder.copy_private());
+  decoder.hooks_ = std::make_unique<Hooks>();
+  decoder.hooks_->bit_depth = format.bit_depth;
+  decoder.hooks_->chroma = format.chroma;
+  decoder.hooks_->pool = std::make_shared<PicturePool>(options.memory);
   AVCodecContext& context = *decoder.context_;
-  if (!format.codec_private.empty()) {
-    context.extradata = static_cast<std::uint8_t*>(
-        av_mallocz(format.codec_private.size() + AV_INPUT_BUFFER_PADDING_SIZE));
-    if (context.extradata == nullptr) {
-      return fail(ErrorCode::kOutOfMemory, track_name(format) + ": no memory for codec_private");
-    }
-    std::copy(format.codec_private.begin(), format.codec_private.end(), context.extradata);
-    context.extradata_size = static_cast<int>(format.codec_private.size());
-  }
   context.width = format.width;
   context.height = format.height;
   // Codecs hold more than the picture against this: it is rounded up to their largest block, and
   // the edge buffer of the MPEG family has 280 rows of any width.
   context.max_pixels = std::int64_t{((format.width + 127) & ~127) + 256} *
                        std::max((format.height + 127) & ~127, 512);
-  context.thread_count = std::clamp(threads, 1, 64);
+  context.thread_count = std::clamp(options.threads, 1, 64);
   context.thread_type = FF_THREAD_FRAME | FF_THREAD_SLICE;
   context.idct_algo = FF_IDCT_SIMPLE;
   // Without it x86 takes approximations of MPEG-4's rounded half samples.
@@ -210,24 +278,43 @@ Result<VideoDecoder> VideoDecoder::open(const VideoFormat& format, int threads) 
   context.err_recognition = AV_EF_CRCCHECK | AV_EF_BITSTREAM | AV_EF_BUFFER | AV_EF_EXPLODE;
   context.workaround_bugs = 0;
   context.log_level_offset = ffmpeg::kQuiet;
-  context.opaque = reinterpret_cast<void*>((std::intptr_t{format.bit_depth} << 8) |
-                                           static_cast<std::intptr_t>(format.chroma));
-  context.get_format = choose_format;
-  const int error = avcodec_open2(&context, codec, nullptr);
+  context.opaque = decoder.hooks_.get();
+  context.get_format = Hooks::choose_format;
+  if ((codec.capabilities & AV_CODEC_CAP_DR1) != 0) context.get_buffer2 = Hooks::get_buffer;
+#if FF_API_THREAD_SAFE_CALLBACKS
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wdeprecated-declarations"
+  // Else frame threads would wait for the thread that sends packets whenever they need a buffer.
+  context.thread_safe_callbacks = 1;
+#pragma GCC diagnostic pop
+#endif
+  const int error = avcodec_open2(&context, &codec, nullptr);
   if (error < 0) {
     return fail(ErrorCode::kCorrupt, track_name(format) +
                                          ": the decoder does not open: " + ffmpeg::reason(error) +
                                          "; its codec_private may be damaged");
   }
-  decoder.format_ = format;
-  decoder.threads_ = threads;
   return decoder;
 }
 
 Status VideoDecoder::reopen() {
-  RELIT_ASSIGN(VideoDecoder fresh, open(format_, threads_));
+  const AVCodec* codec = context_->codec;
+  RELIT_ASSIGN(VideoDecoder fresh, open_codec(format_, options_, *codec));
+  fresh.named_ = named_;
+  fresh.proven_ = proven_;
+  fresh.note_ = std::move(note_);
   *this = std::move(fresh);
   return {};
+}
+
+bool VideoDecoder::fell_back() {
+  if (!named_ || proven_) return false;
+  auto software = open_codec(format_, options_, *find_software(format_.codec));
+  if (!software) return false;
+  software->note_ = track_name(format_) + ": " + options_.name +
+                    " failed before its first picture, software takes its place";
+  *this = std::move(*software);
+  return true;
 }
 
 Status VideoDecoder::send(std::span<const std::uint8_t> packet, std::int64_t pts, bool key) {
@@ -288,6 +375,7 @@ Result<VideoDecoder::Received> VideoDecoder::receive(VideoFrame& out) {
     out.clear();
     return Unexpected{std::move(checked).error()};
   }
+  proven_ = true;
   return Received::kFrame;
 }
 
@@ -312,6 +400,39 @@ Status VideoDecoder::check(const AVFrame& frame) const {
 }
 
 void VideoDecoder::flush() { avcodec_flush_buffers(context_.get()); }
+
+namespace {
+
+/// What the software decoders make of the streams that relit-bake writes.
+AVPixelFormat decoded_pixels(const VideoFormat& format) {
+  const bool deep = format.bit_depth > 8;
+  if (format.chroma == container::Chroma::k444) {
+    return deep ? AV_PIX_FMT_YUV444P10 : AV_PIX_FMT_YUV444P;
+  }
+  // Gray comes with chroma that nobody reads, 4:2:0 from H.264 and MPEG-4.
+  const bool gray = format.chroma == container::Chroma::kLuma && format.codec != "h264" &&
+                    format.codec != "mpeg4";
+  if (gray && format.codec == "vp9") return deep ? AV_PIX_FMT_GBRP10 : AV_PIX_FMT_GBRP;
+  if (gray) return deep ? AV_PIX_FMT_GRAY10 : AV_PIX_FMT_GRAY8;
+  return deep ? AV_PIX_FMT_YUV420P10 : AV_PIX_FMT_YUV420P;
+}
+
+}  // namespace
+
+Result<std::uint64_t> picture_buffer_bytes(const VideoFormat& format) {
+  RELIT_TRY(check_format(format));
+  const AVCodec* codec = find_software(format.codec);
+  const ffmpeg::Codec context(codec != nullptr ? avcodec_alloc_context3(codec) : nullptr);
+  if (!context) {
+    return fail(ErrorCode::kUnsupported, track_name(format) + ": no such decoder here");
+  }
+  context->pix_fmt = decoded_pixels(format);
+  // Coded sizes are whole blocks, also where the stream crops them.
+  const int block = format.codec == "h264" ? 16 : format.codec == "hevc" ? 8 : 1;
+  const auto coded = [block](int side) { return (side + block - 1) / block * block; };
+  const auto layout = picture_layout(*context, coded(format.width), coded(format.height));
+  return static_cast<std::uint64_t>(layout.bytes);
+}
 
 std::uint64_t picture_bytes(int width, int height, container::Chroma chroma, int bit_depth) {
   const auto w = static_cast<std::uint64_t>(width), h = static_cast<std::uint64_t>(height);

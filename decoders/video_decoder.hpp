@@ -11,6 +11,9 @@
 #include "container/base/result.hpp"
 #include "container/records.hpp"
 #include "decoders/ffmpeg.hpp"
+#include "decoders/picture_pool.hpp"
+
+struct AVCodec;
 
 /// libavcodec, restricted to what planes need: pictures as they were coded, never scaled, never
 /// converted, never concealed.
@@ -44,10 +47,26 @@ class VideoFrame {
   [[nodiscard]] std::int64_t pts() const;
   /// All samples of component 0, 1 or 2. Requires !empty().
   [[nodiscard]] SampleView component(int index) const;
+  /// What the picture's buffers take. Requires !empty().
+  [[nodiscard]] std::size_t buffer_bytes() const;
+  /// Whether both are references to one picture.
+  [[nodiscard]] bool same_picture(const VideoFrame& other) const;
 
  private:
   friend class VideoDecoder;
   AVFrame* frame_ = nullptr;  ///< null only when moved from, or out of memory
+};
+
+struct VideoDecoderOptions {
+  /// More than 1 decodes so many frames at once, each of which adds a packet of delay and a picture
+  /// of memory; the samples are the same.
+  int threads = 1;
+  /// A decoder of libavcodec by its name, such as "h264_v4l2m2m", that is tried first for streams
+  /// of its codec. Hardware is used only so. Where it does not open, or fails before its first
+  /// picture, libavcodec's own software takes its place and note() says so. Empty: none.
+  std::string name;
+  /// Also counts the pictures' buffers, with those of other decoders. May be null.
+  std::shared_ptr<PictureMemory> memory;
 };
 
 /// One video stream. Not thread-safe; different decoders may run on different threads.
@@ -57,9 +76,9 @@ class VideoFrame {
 class VideoDecoder {
  public:
   /// Errors: kUnsupported (codec outside the list, or missing from this libavcodec), kLimit,
-  /// kInvalid, kCorrupt (codec_private). `threads` > 1 decodes so many frames at once, each of
-  /// which adds a packet of delay and a picture of memory; the samples are the same.
-  static Result<VideoDecoder> open(const VideoFormat& format, int threads = 1);
+  /// kInvalid, kCorrupt (codec_private).
+  static Result<VideoDecoder> open(const VideoFormat& format,
+                                   const VideoDecoderOptions& options = {});
 
   VideoDecoder(VideoDecoder&&) noexcept;
   VideoDecoder& operator=(VideoDecoder&&) noexcept;
@@ -82,15 +101,37 @@ class VideoDecoder {
   /// Starts afresh with a new libavcodec decoder: after damage, some of them keep more than flush()
   /// clears. Errors: as open(); the decoder is then as before.
   Status reopen();
+  /// Whether a decoder that was asked for by name has failed before its first picture; software has
+  /// then been opened in its place, afresh. True once at most.
+  [[nodiscard]] bool fell_back();
+
+  /// Why another decoder than the one asked for by name is at work; empty: it is not.
+  [[nodiscard]] const std::string& note() const { return note_; }
+  /// Of the pictures' buffers, where the codec takes them from outside (all but "av1" do).
+  [[nodiscard]] const PicturePool& pool() const;
 
  private:
-  VideoDecoder() = default;
+  struct Hooks;  ///< what libavcodec calls back for
+
+  VideoDecoder();
+  static Result<VideoDecoder> open_codec(const VideoFormat& format,
+                                         const VideoDecoderOptions& options, const AVCodec& codec);
+  Status copy_private();
   [[nodiscard]] Status check(const AVFrame& frame) const;
+
+  std::unique_ptr<Hooks> hooks_;  ///< outlives the context that points to it
   ffmpeg::Codec context_;
   ffmpeg::Packet packet_;
   VideoFormat format_;
-  int threads_ = 1;
+  VideoDecoderOptions options_;
+  bool named_ = false;   ///< the decoder asked for by name is at work
+  bool proven_ = false;  ///< it has given a picture
+  std::string note_;
 };
+
+/// Bytes of the buffer that a software decoder asks for, per picture of this stream. Errors: those
+/// of VideoDecoder::open() as far as `format` alone is concerned.
+[[nodiscard]] Result<std::uint64_t> picture_buffer_bytes(const VideoFormat& format);
 
 /// Bytes of one decoded picture of this shape, without libavcodec's padding.
 [[nodiscard]] std::uint64_t picture_bytes(int width, int height, container::Chroma chroma,

@@ -56,9 +56,11 @@ glm::mat3 ray_matrix(const View& view, float rotation_rad) {
 }  // namespace
 
 Result<BackgroundRenderer> BackgroundRenderer::create(const Device& device) {
+  RELIT_TRY(device.ready("creating a background"));
   BackgroundRenderer renderer;
   renderer.device_ = &device;
   renderer.half_float_ = device.caps().half_float_texture && device.caps().half_float_linear;
+  StateGuard guard(device);
   const std::string_view vertex[] = {shaders::present_vert};
   const std::string_view fragment[] = {shaders::dither, shaders::gradient_frag};
   RELIT_ASSIGN(renderer.gradient_, build_program(device.gl(), device.profile(),
@@ -69,6 +71,7 @@ Result<BackgroundRenderer> BackgroundRenderer::create(const Device& device) {
 }
 
 Status BackgroundRenderer::set(const Background& b) {
+  RELIT_TRY(device_->ready("setting the background"));
   const bool environment = b.kind == Background::Kind::kEnvironment;
   const bool harmonics = b.kind == Background::Kind::kHarmonics;
   if (environment || harmonics) {
@@ -161,6 +164,7 @@ Result<BackgroundRenderer::SkyProgram*> BackgroundRenderer::sky_program(ToneMap 
 }
 
 Status BackgroundRenderer::draw(const View& view) {
+  if (kind_ == Background::Kind::kKeep) return {};
   const Functions& gl = device_->gl();
   // A clear is cut to the scissor, not to the viewport.
   gl.Enable(GL_SCISSOR_TEST);

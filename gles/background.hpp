@@ -18,6 +18,7 @@ struct Background {
     kGradient,     ///< from `bottom` to `top` of the picture
     kEnvironment,  ///< the picture of the light, exposed and tone mapped like the meshes
     kHarmonics,    ///< the radiance that spherical harmonics give back, likewise
+    kKeep,         ///< what the framebuffer holds: colour and depth stay
   };
   Kind kind = Kind::kTransparent;
   std::array<float, 3> top{};  ///< sRGB display values 0..1, neither exposed nor tone mapped
@@ -43,8 +44,8 @@ class BackgroundRenderer {
   /// Turns the light about +Y: `angle_rad` is added to φ.
   void set_rotation(float angle_rad) { rotation_rad_ = angle_rad; }
 
-  /// Fills the view's rectangle of the bound framebuffer, depth included (to 1). Inside a
-  /// StateGuard.
+  /// Fills the view's rectangle of the bound framebuffer, depth included (to 1), or keeps it.
+  /// Inside a StateGuard.
   Status draw(const View& view);
 
  private:

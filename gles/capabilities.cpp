@@ -98,6 +98,14 @@ void query_formats(const Functions& gl, const Extensions& extensions, Capabiliti
       (es3 && !extensions.ignores("GL_OES_texture_npot")) || extensions.has("GL_OES_texture_npot");
   caps.unpack_row_length = (es3 && !extensions.ignores("GL_EXT_unpack_subimage")) ||
                            extensions.has("GL_EXT_unpack_subimage");
+  caps.vertex_array_object = extensions.has("GL_OES_vertex_array_object");
+  if ((!desktop && es32) || (desktop && caps.version.major * 10 + caps.version.minor >= 45)) {
+    caps.reset_status = "glGetGraphicsResetStatus";
+  } else if (extensions.has("GL_KHR_robustness")) {
+    caps.reset_status = desktop ? "glGetGraphicsResetStatus" : "glGetGraphicsResetStatusKHR";
+  } else if (extensions.has("GL_EXT_robustness")) {
+    caps.reset_status = "glGetGraphicsResetStatusEXT";
+  }
   caps.depth24 = es3 || extensions.has("GL_OES_depth24");
 }
 
@@ -105,6 +113,7 @@ void query_limits(const Functions& gl, const Extensions& extensions, Capabilitie
   caps.max_texture_size = get_int(gl, GL_MAX_TEXTURE_SIZE);
   caps.max_cube_size = get_int(gl, GL_MAX_CUBE_MAP_TEXTURE_SIZE);
   caps.max_texture_units = get_int(gl, GL_MAX_TEXTURE_IMAGE_UNITS);
+  caps.max_vertex_attributes = get_int(gl, GL_MAX_VERTEX_ATTRIBS);
   if (caps.version.is_es) {
     caps.max_varying_vectors = get_int(gl, GL_MAX_VARYING_VECTORS);
     caps.max_vertex_uniform_vectors = get_int(gl, GL_MAX_VERTEX_UNIFORM_VECTORS);

@@ -47,10 +47,13 @@ struct Capabilities {
   bool npot_repeat = false;  ///< repeat and mipmaps for sizes that are no powers of two
   bool unpack_row_length = false;
   bool depth24 = false;
-  int max_texture_size = 64;  ///< texels
-  int max_cube_size = 16;     ///< texels
-  int max_texture_units = 8;  ///< of the fragment shader
+  bool vertex_array_object = false;    ///< OES_vertex_array_object, of ES 2
+  const char* reset_status = nullptr;  ///< name of glGetGraphicsResetStatus here; null: none
+  int max_texture_size = 64;           ///< texels
+  int max_cube_size = 16;              ///< texels
+  int max_texture_units = 8;           ///< of the fragment shader
   int max_varying_vectors = 8;
+  int max_vertex_attributes = 8;
   int max_vertex_uniform_vectors = 128;
   int max_fragment_uniform_vectors = 16;
   int max_samples = 0;  ///< of renderbuffers; 0: no multisampling

@@ -11,20 +11,6 @@
 namespace relit::gles {
 namespace {
 
-constexpr GLuint kPosition = 0, kLightMapUv = 1, kAlbedoUv = 2, kColor = 3;
-constexpr std::string_view kAttributes[] = {"a_position", "a_light_map_uv", "a_albedo_uv",
-                                            "a_color"};
-
-// What a shader was compiled for; the tone map is in the two lowest bits.
-enum : unsigned {
-  kTexture = 1u << 2,
-  kMask = 1u << 3,
-  kBlend = 1u << 4,
-  kSquareRoot = 1u << 5,
-  kManualBilinear = 1u << 6,
-  kWrapInShader = 1u << 7,
-};
-
 float wrap_code(Wrap wrap) {
   return wrap == Wrap::kClamp ? 0.0f : wrap == Wrap::kRepeat ? 1.0f : 2.0f;
 }
@@ -79,6 +65,7 @@ Status CharacterRenderer::check_mesh(const MeshView& mesh, std::size_t index) co
 }
 
 Status CharacterRenderer::set_meshes(std::span<const MeshView> meshes) {
+  RELIT_TRY(device_.ready("uploading meshes"));
   if (meshes.size() > limits::kMeshes)
     return fail(ErrorCode::kLimit, std::to_string(meshes.size()) + " meshes; at most " +
                                        std::to_string(limits::kMeshes) + " are possible");
@@ -161,6 +148,7 @@ Status CharacterRenderer::update_positions(std::size_t index,
     return fail(ErrorCode::kInvalid, "mesh " + std::to_string(index) + " gets " +
                                          std::to_string(positions.size()) +
                                          " positions; it does not exist or has another number");
+  RELIT_TRY(device_.ready("updating positions"));
   Mesh& mesh = meshes_[index];
   const std::uint32_t material = mesh.material;
   if (material < materials_.materials().size() &&
@@ -201,9 +189,28 @@ void CharacterRenderer::sort_meshes(const View& view) {
 }
 
 Status CharacterRenderer::draw(const View& view, const LightMap& map) {
-  const float scale = view.exposure * map.scale * map.magnitude;
-  if (!is_finite(view.view) || !is_finite(view.projection) || !std::isfinite(scale) ||
-      !(view.exposure >= 0) || view.width < 1 || view.height < 1)
+  return draw(view, Light{&map, nullptr});
+}
+
+Status CharacterRenderer::draw(const View& view, FusedLight& light) {
+  return draw(view, Light{nullptr, &light});
+}
+
+Status CharacterRenderer::draw_background(const View& view) {
+  RELIT_TRY(device_.ready("drawing"));
+  if (!std::isfinite(view.exposure) || !(view.exposure >= 0) || view.width < 1 || view.height < 1)
+    return fail(ErrorCode::kInvalid, "the view's size or its exposure make no sense");
+  StateGuard guard(device_);
+  device_.gl().Viewport(view.x, view.y, view.width, view.height);
+  RELIT_TRY(background_.draw(view));
+  return device_.check("drawing");
+}
+
+Status CharacterRenderer::draw(const View& view, const Light& light) {
+  RELIT_TRY(device_.ready("drawing"));
+  if (!is_finite(view.view) || !is_finite(view.projection) ||
+      !std::isfinite(view.exposure * light.scale()) || !(view.exposure >= 0) || view.width < 1 ||
+      view.height < 1)
     return fail(ErrorCode::kInvalid,
                 "the view's matrices, its size or its exposure times the light make no sense");
   for (const Mesh& mesh : meshes_)
@@ -212,54 +219,68 @@ Status CharacterRenderer::draw(const View& view, const LightMap& map) {
                   "a mesh uses material " + std::to_string(mesh.material) + ", but only " +
                       std::to_string(materials_.materials().size()) + " are set");
   const Functions& gl = device_.gl();
-  StateGuard guard(device_, 2);
+  StateGuard guard(device_, light.fused != nullptr ? std::max(2, light.fused->unit_count()) : 2);
   gl.Viewport(view.x, view.y, view.width, view.height);
   RELIT_TRY(background_.draw(view));
   view_projection_ = view.projection * view.view;
   sort_meshes(view);
   gl.Enable(GL_DEPTH_TEST);
-  gl.DepthFunc(GL_LESS);
   gl.Enable(GL_CULL_FACE);
-  gl.CullFace(GL_BACK);
-  gl.FrontFace(GL_CCW);
   gl.BlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
+  if (light.fused != nullptr) {
+    light.fused->bind(gl);
+  } else {
+    gl.BindTexture(GL_TEXTURE_2D, light.map->texture);
+  }
   for (const std::uint32_t index : order_)
-    if (meshes_[index].has_positions) RELIT_TRY(draw_with_material(meshes_[index], view, map));
+    if (meshes_[index].has_positions) RELIT_TRY(draw_with_material(meshes_[index], view, light));
   return device_.check("drawing");
 }
 
 Status CharacterRenderer::draw_with_material(const Mesh& mesh, const View& view,
-                                             const LightMap& map) {
+                                             const Light& light) {
   const Functions& gl = device_.gl();
   const MaterialTexture& entry = materials_.materials()[mesh.material];
   const MaterialView& material = entry.material;
-  RELIT_ASSIGN(Shader * shader, shader_for(entry, map, view.tone_map));
+  auto found = light.fused != nullptr
+                   ? light.fused->shaders().find(device_, entry, view.tone_map, *light.fused)
+                   : shaders_.find(device_, entry, view.tone_map, *light.map);
+  RELIT_ASSIGN(CharacterShader * shader, std::move(found));
   gl.UseProgram(shader->program.name());
   gl.UniformMatrix4fv(shader->view_projection, 1, GL_FALSE, glm::value_ptr(view_projection_));
   gl.Uniform4f(shader->base_color, material.base_color[0], material.base_color[1],
                material.base_color[2], material.base_color[3]);
-  const float scale = view.exposure * map.scale * map.magnitude;
-  // A half float that overflows would make black NaN.
-  const bool half = device_.profile() == Profile::kEs2Mediump;
-  gl.Uniform1f(shader->light_scale, half ? std::min(scale, 60000.0f) : scale);
-  const auto width = static_cast<float>(map.width);
-  const auto height = static_cast<float>(map.height);
-  gl.Uniform4f(shader->light_map_size, width, height, 1 / width, 1 / height);
   gl.Uniform1f(shader->alpha_cutoff, material.alpha_cutoff);
   gl.Uniform2f(shader->wrap, wrap_code(material.wrap_u), wrap_code(material.wrap_v));
+  set_light(*shader, view, light);
+  if (light.fused != nullptr) light.fused->apply(gl, *shader);
   if (entry.texture >= 0) {
     gl.ActiveTexture(GL_TEXTURE1);
     gl.BindTexture(GL_TEXTURE_2D, materials_.texture(entry.texture));
     gl.ActiveTexture(GL_TEXTURE0);
   }
-  gl.BindTexture(GL_TEXTURE_2D, map.texture);
-  const bool blend = material.alpha_mode == AlphaMode::kBlend;
-  if (blend) {
+  if (material.alpha_mode == AlphaMode::kBlend) {
     gl.Enable(GL_BLEND);
     gl.DepthMask(GL_FALSE);
   }
   draw_mesh(mesh);
   return {};
+}
+
+void CharacterRenderer::set_light(const CharacterShader& shader, const View& view,
+                                  const Light& light) const {
+  const Functions& gl = device_.gl();
+  const float scale = view.exposure * light.scale();
+  // A half float that overflows would make black NaN.
+  const bool half = device_.profile() == Profile::kEs2Mediump;
+  gl.Uniform1f(shader.light_scale, half ? std::min(scale, 60000.0f) : scale);
+  constexpr std::array<float, 4> kWhole{1, 1, 0, 0};
+  const std::array<float, 4>& place = light.map != nullptr ? light.map->place : kWhole;
+  gl.Uniform4f(shader.light_map_place, place[0], place[1], place[2], place[3]);
+  if (light.map == nullptr) return;
+  const auto width = static_cast<float>(light.map->width);
+  const auto height = static_cast<float>(light.map->height);
+  gl.Uniform4f(shader.light_map_size, width, height, 1 / width, 1 / height);
 }
 
 void CharacterRenderer::draw_mesh(const Mesh& mesh) const {
@@ -279,51 +300,6 @@ void CharacterRenderer::draw_mesh(const Mesh& mesh) const {
   gl.BindBuffer(GL_ELEMENT_ARRAY_BUFFER, 0);
   for (const GLuint attribute : {kPosition, kLightMapUv, kAlbedoUv, kColor})
     gl.DisableVertexAttribArray(attribute);
-}
-
-Result<CharacterRenderer::Shader*> CharacterRenderer::shader_for(const MaterialTexture& entry,
-                                                                 const LightMap& map,
-                                                                 ToneMap tone_map) {
-  unsigned key = static_cast<unsigned>(tone_map);
-  if (entry.texture >= 0) key |= kTexture;
-  if (entry.material.alpha_mode == AlphaMode::kMask) key |= kMask;
-  if (entry.material.alpha_mode == AlphaMode::kBlend) key |= kBlend;
-  if (map.square_root) key |= kSquareRoot;
-  if (!map.linear_filter) key |= kManualBilinear;
-  if (entry.wrap_in_shader) key |= kWrapInShader;
-  const auto known = shaders_.find(key);
-  if (known != shaders_.end()) return &known->second;
-  RELIT_ASSIGN(Shader shader, build_shader(key));
-  return &shaders_.emplace(key, std::move(shader)).first->second;
-}
-
-Result<CharacterRenderer::Shader> CharacterRenderer::build_shader(unsigned key) const {
-  std::string defines = "TONE_MAP " + std::to_string(key & 3u) + "\n";
-  if (key & kTexture) defines += "ALBEDO_TEXTURE 1\n";
-  if ((key & kTexture) && !device_.is_es3()) defines += "DECODE_ALBEDO 1\n";
-  if (key & kMask) defines += "ALPHA_MASK 1\n";
-  if (key & kBlend) defines += "ALPHA_BLEND 1\n";
-  if (key & kSquareRoot) defines += "SQUARE_ROOT 1\n";
-  if (key & kManualBilinear) defines += "MANUAL_BILINEAR 1\n";
-  if (key & kWrapInShader) defines += "WRAP_IN_SHADER 1\n";
-  const std::string_view vertex[] = {shaders::character_vert};
-  const std::string_view fragment[] = {shaders::dither, shaders::color, shaders::character_frag};
-  const Functions& gl = device_.gl();
-  Shader shader;
-  RELIT_ASSIGN(
-      shader.program,
-      build_program(gl, device_.profile(), {"character", defines, vertex, fragment, kAttributes}));
-  const GLuint program = shader.program.name();
-  shader.view_projection = gl.GetUniformLocation(program, "u_view_projection");
-  shader.base_color = gl.GetUniformLocation(program, "u_base_color");
-  shader.light_scale = gl.GetUniformLocation(program, "u_light_scale");
-  shader.light_map_size = gl.GetUniformLocation(program, "u_light_map_size");
-  shader.alpha_cutoff = gl.GetUniformLocation(program, "u_alpha_cutoff");
-  shader.wrap = gl.GetUniformLocation(program, "u_wrap");
-  gl.UseProgram(program);
-  gl.Uniform1i(gl.GetUniformLocation(program, "u_light_map"), 0);
-  gl.Uniform1i(gl.GetUniformLocation(program, "u_albedo"), 1);
-  return shader;
 }
 
 std::size_t CharacterRenderer::gpu_bytes() const { return mesh_bytes_ + materials_.gpu_bytes(); }

@@ -2,12 +2,13 @@
 #pragma once
 
 #include <glm/glm.hpp>
-#include <map>
 #include <memory>
 #include <span>
 #include <vector>
 
 #include "gles/background.hpp"
+#include "gles/character_shaders.hpp"
+#include "gles/fused_light.hpp"
 #include "gles/light_map.hpp"
 #include "gles/material_textures.hpp"
 #include "gles/view.hpp"
@@ -48,7 +49,8 @@ class CharacterRenderer {
   /// kOutOfMemory.
   Status set_meshes(std::span<const MeshView> meshes);
 
-  /// The posed vertices of a mesh, model space, vertex_count of them. Errors: kInvalid.
+  /// The posed vertices of a mesh, model space, vertex_count of them. Of GL's state it touches only
+  /// the array buffer's binding, which it leaves empty. Errors: kInvalid.
   Status update_positions(std::size_t mesh, std::span<const glm::vec3> positions);
 
   /// What is behind the meshes.
@@ -59,6 +61,10 @@ class CharacterRenderer {
   /// for a view or a light map that is not finite, or a mesh whose material does not exist;
   /// kEnvironment from GL.
   Status draw(const View& view, const LightMap& light_map);
+  /// The same picture, with a light that is composited in the meshes' shader.
+  Status draw(const View& view, FusedLight& light);
+  /// The background without meshes. Errors: as draw().
+  Status draw_background(const View& view);
 
   /// Buffers and textures, for the memory plan.
   [[nodiscard]] std::size_t gpu_bytes() const;
@@ -77,10 +83,13 @@ class CharacterRenderer {
     Buffer indices;
     VertexArray array;
   };
-  struct Shader {
-    Program program;
-    GLint view_projection = -1, base_color = -1, light_scale = -1, light_map_size = -1,
-          alpha_cutoff = -1, wrap = -1;
+  // One of two.
+  struct Light {
+    const LightMap* map = nullptr;
+    FusedLight* fused = nullptr;
+    [[nodiscard]] float scale() const {
+      return map != nullptr ? map->scale * map->magnitude : fused->scale() * fused->magnitude();
+    }
   };
 
   explicit CharacterRenderer(const Device& device) : device_(device) {}
@@ -90,10 +99,9 @@ class CharacterRenderer {
   void set_attributes(const Mesh& mesh) const;
   void draw_mesh(const Mesh& mesh) const;
   void sort_meshes(const View& view);
-  Result<Shader*> shader_for(const MaterialTexture& material, const LightMap& map,
-                             ToneMap tone_map);
-  Result<Shader> build_shader(unsigned key) const;
-  Status draw_with_material(const Mesh& mesh, const View& view, const LightMap& map);
+  Status draw(const View& view, const Light& light);
+  Status draw_with_material(const Mesh& mesh, const View& view, const Light& light);
+  void set_light(const CharacterShader& shader, const View& view, const Light& light) const;
 
   const Device& device_;
   BackgroundRenderer background_;
@@ -101,7 +109,7 @@ class CharacterRenderer {
   std::vector<Mesh> meshes_;
   std::vector<std::uint32_t> order_;  // of drawing: opaque by material, then blended by depth
   std::vector<float> depths_;
-  std::map<unsigned, Shader> shaders_;
+  CharacterShaders shaders_;  // for light maps
   glm::mat4 view_projection_{1.0f};
   std::size_t mesh_bytes_ = 0;
 };

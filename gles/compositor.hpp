@@ -7,23 +7,30 @@
 #include <vector>
 
 #include "container/base/plane_view.hpp"
+#include "gles/fused_light.hpp"
 #include "gles/light_map.hpp"
+#include "gles/light_map_mixer.hpp"
+#include "gles/plane_pass.hpp"
 #include "gles/plane_sheets.hpp"
 
 namespace relit::gles {
 
-/// The composite in texture space on the GPU: light map = constant + Σ_k w[k] · value_k, one
-/// fragment a texel. Planes stay as they were decoded: bytes go up, and mantissa and exponent are
-/// joined in the fragment shader (Xu et al., section 3.3; here with signed mantissas and any
-/// matrix).
+/// The composite on the GPU: light map = constant + Σ_k w[k] · value_k. Planes stay as they were
+/// decoded: bytes go up, and mantissa and exponent are joined in the fragment shader (Xu et al.,
+/// section 3.3; here with signed mantissas and any matrix). composite() adds in texture space, one
+/// fragment a texel; fuse() leaves the sum to the shader that draws the meshes.
 ///
-/// Everything fits one pass where uniforms and texture units allow it (about 100 planes on ES 3, 27
-/// to 48 on ES 2). More planes, and all but the smallest sets with half-float fragments (at most 16
-/// lookups a pass, for their addresses must be varyings), take several passes that add up in the
-/// half-float target. Values are scaled by a power of two so that no sum leaves the range of half
-/// floats, and exponents count from the frame's largest one.
+/// In texture space everything fits one pass where uniforms and texture units allow it (200 planes
+/// and more on ES 3, some 100 on most of ES 2). More planes, and all but the smallest sets with
+/// half-float fragments (at most 16 lookups a pass, for their addresses must be varyings), take
+/// several passes that add up in the half-float target. Values are scaled by a power of two so that
+/// no sum leaves the range of half floats, and exponents count from the frame's largest one.
 ///
-/// Steady state allocates nothing. GL state: see Device. One thread, the context's.
+/// Where planes change every frame there are two slots that hold a frame each, and a blend of both
+/// is the same sum with twice the planes. Shaders are straight lines for the number of planes that
+/// have a weight, in a few shades, and compiled when first needed: with the light's first frame,
+/// with its first blend. Besides, steady state allocates nothing. GL state: see Device. One thread,
+/// the context's.
 class Compositor {
  public:
   /// Compiles the shaders and allocates textures. Errors: kInvalid, kLimit (planes too large),
@@ -33,91 +40,110 @@ class Compositor {
   static Result<std::unique_ptr<Compositor>> create(const Device& device,
                                                     const PlaneSetDescription& description);
 
-  /// Uploads a frame's planes, as many as were described and as described (bit depth, shifts, sizes
-  /// at least the light map's). Those with an empty mantissa view are left out: for planes with
-  /// weight 0. What the views point to can go when it returns. Errors: kInvalid; kEnvironment from
-  /// GL.
+  /// Uploads a frame's planes to a slot, as many as were described and as described (bit depth,
+  /// shifts, sizes at least the light map's). Those with an empty mantissa view, or with 0 in
+  /// `wanted` (empty: all are wanted), are left out and count as zero; with `keep`, planes that the
+  /// slot has of the same frame stay and are not uploaded again. What the views point to can go
+  /// when it returns. Errors: kInvalid; kEnvironment from GL.
+  Status upload(std::span<const PlaneView> planes, int slot,
+                std::span<const std::uint8_t> wanted = {}, bool keep = false);
+  /// The same to the slot that was not used last.
   Status upload(std::span<const PlaneView> planes);
+  [[nodiscard]] int slot_count() const { return sheets_.slot_count(); }
+  [[nodiscard]] bool holds(std::size_t plane, int slot) const {
+    return sheets_.state(plane, slot).present;
+  }
 
-  /// Composites the planes uploaded last. Errors: kInvalid (count of weights, a number that is not
-  /// finite, a plane with a weight that was not uploaded), kUnsupported for a light with a
-  /// prediction plane, whose models the CPU composites. (s · E(N) would be one more additive pass
-  /// at the end of this function: the posed meshes drawn in light-map coordinates, with their
-  /// normals as an attribute, s's sheet as a texture and FoldedLight::irradiance as sixteen
-  /// uniforms.)
+  /// Composites frames that were uploaded. `half_size`: every second texel of every second row, see
+  /// LightMap::place. Errors: kInvalid (nothing uploaded, count of weights, a number that is not
+  /// finite), kUnsupported for a light with a prediction plane, whose models the CPU composites.
+  /// (s · E(N) would be one more additive pass at the end of this function: the posed meshes drawn
+  /// in light-map coordinates, with their normals as an attribute, s's sheet as a texture and
+  /// FoldedLight::irradiance as sixteen uniforms.)
+  Result<LightMap> composite(const FoldedLight& light, const FrameSlots& frames,
+                             bool half_size = false);
+  /// The frame uploaded last.
   Result<LightMap> composite(const FoldedLight& light);
 
-  /// Reads the last composite into [3][height][width], not multiplied by the light's magnitude:
-  /// what decoders::CompositeJob computes. Negative values survive except from kSquareRoot8. Waits
-  /// for the GPU. Errors: kInvalid for the wrong size or before the first composite.
+  /// The same sum for CharacterRenderer::draw() to take where it is seen. Valid, with the planes of
+  /// the moment, until the next upload to a slot in use or the next fuse(). Errors: as composite();
+  /// kUnsupported where the planes do not fit one shader besides the material's texture, or where
+  /// fragments are half floats, which cannot address texels.
+  Result<FusedLight*> fuse(const FoldedLight& light, const FrameSlots& frames);
+  /// Whether fuse() can work, without a light. Errors: kUnsupported, saying why not.
+  Status prepare_fused();
+
+  /// Reads the last composite into [3][height][width] of its size, not multiplied by the light's
+  /// magnitude: what decoders::CompositeJob computes. Negative values survive except from
+  /// kSquareRoot8. Waits for the GPU. Errors: kInvalid for the wrong size or before the first
+  /// composite.
   Status read_back(std::span<float> out);
 
   [[nodiscard]] LightMapFormat format() const { return storage_.format; }
-  [[nodiscard]] int pass_count() const { return static_cast<int>(passes_.size()); }
+  /// Passes for one frame; for a blend of two.
+  [[nodiscard]] int pass_count() const;
+  [[nodiscard]] int blend_pass_count() const { return static_cast<int>(passes_.size()); }
   /// What textures take on the GPU, and buffers on the CPU, for the memory plan.
   [[nodiscard]] std::size_t gpu_bytes() const;
   [[nodiscard]] std::size_t cpu_bytes() const;
 
  private:
-  // Up to three planes that are fetched together, with one exponent or none.
-  struct Group {
-    std::array<int, 3> planes{-1, -1, -1};
-  };
-  // Groups that fetch from the same sheets: one loop of the shader.
-  struct Batch {
-    int planes_per_group = 1;
-    std::array<int, 3> sheets{-1, -1, -1};
-    int exponent_sheet = -1;
-    bool wide = false;
-    std::vector<Group> groups;
-    GLint data = -1;  // uniform locations
-    GLint count = -1;
-    [[nodiscard]] bool same_kind(const Batch& other) const;
-    [[nodiscard]] int lookups() const { return planes_per_group + (exponent_sheet >= 0 ? 1 : 0); }
-    [[nodiscard]] int stride() const {
-      return 2 * planes_per_group + (exponent_sheet >= 0 ? 1 : 0);
-    }
-  };
-  struct Pass {
-    std::vector<Batch> batches;
-    std::vector<int> sheets;  // by texture unit
+  // A shader for so many groups of each batch of a pass; for any number where lookups are varyings.
+  struct Shader {
+    std::vector<int> counts;
+    PlanePass::Locations locations;
     Program program;
     GLint constant = -1;
+    GLint texels = -1;
     GLint to_unit = -1;
-    GLint place = -1;  // mediump only
-    GLint weight = -1;
+  };
+  struct Pass {
+    PlanePass planes;
+    PlanePass::Weights weights;
+    std::vector<Shader> shaders;
+  };
+  struct Target {
+    int width = 0, height = 0;
+    Texture texture;
+    FramebufferObject framebuffer;
   };
 
   explicit Compositor(const Device& device) : device_(device) {}
 
-  std::vector<Batch> group_planes(const PlaneSetDescription& description) const;
-  void split_into_passes(std::vector<Batch> batches);
-  Status build_pass(Pass& pass);
-  [[nodiscard]] std::string loop_shader(const Pass& pass) const;
-  [[nodiscard]] std::string unrolled_shader(const Pass& pass) const;
-
-  void sample_planes(std::span<const PlaneView> planes);
-  [[nodiscard]] double sampled_peak(const FoldedLight& light) const;
-  Status check_light(const FoldedLight& light) const;
-  [[nodiscard]] bool is_active(const Group& group, const FoldedLight& light) const;
-  bool draw_pass(const Pass& pass, const FoldedLight& light, bool first);
-  int fill_batch(const Batch& batch, const FoldedLight& light);
-  void draw_unrolled(const Pass& pass, const FoldedLight& light);
-  [[nodiscard]] std::array<float, 4> weight_of(int plane, const FoldedLight& light) const;
+  [[nodiscard]] bool has_lookups() const;
+  Result<Shader> build_shader(const Pass& pass, std::span<const int> counts) const;
+  Status build_first_shader();
+  Result<Shader*> shader_for(Pass& pass);
+  Status make_target(Target& target, int width, int height) const;
+  void sample_planes(std::span<const PlaneView> planes, int slot);
+  [[nodiscard]] double sampled_peak(const FoldedLight& light, const FrameSlots& frames) const;
+  struct Drawing {
+    const FoldedLight& light;
+    const FrameSlots& frames;
+    double normalisation;
+    std::array<float, 4> texels;
+  };
+  Result<LightMap> composite_into(Target& target, const FoldedLight& light,
+                                  const FrameSlots& frames, bool half_size);
+  Result<LightMap> composite_apart(const FoldedLight& light, const FrameSlots& frames,
+                                   bool half_size);
+  Result<bool> draw_pass(Pass& pass, const Drawing& drawing, bool first);
 
   const Device& device_;
-  int width_ = 0, height_ = 0;
+  PlaneSetDescription description_;
   LightMapStorage storage_;
   PlaneSheets sheets_;
   std::vector<Pass> passes_;
-  Texture target_;
-  FramebufferObject framebuffer_;
+  bool can_add_ = false;
+  std::array<Target, 4> targets_;  // full size, half size; the same for composite_apart()'s second
+  std::array<std::unique_ptr<LightMapMixer>, 2> mixers_;  // composite_apart()'s, likewise
+  std::unique_ptr<FusedLight> fused_;
   LightMap result_;
-  double normalisation_ = 1;     // texture = composite / normalisation, except for square roots
-  std::vector<float> uniforms_;  // places and weights of a batch, as passed to GL
-  std::vector<float> places_;    // mediump: vertex uniforms
-  std::vector<float> samples_;   // square roots: [plane][kSamples], for the peak
-  std::vector<float> pixels_;    // read_back()'s
+  const Target* drawn_ = nullptr;
+  LightMapMixer* mixed_ = nullptr;  // who holds the last composite instead of drawn_; null: nobody
+  int last_slot_ = -1;
+  std::vector<float> samples_;  // square roots: [slot][plane][kSamples], for the peak
+  std::vector<float> pixels_;   // read_back()'s
 };
 
 }  // namespace relit::gles

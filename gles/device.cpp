@@ -45,8 +45,12 @@ Result<std::unique_ptr<Device>> Device::create(const DeviceOptions& options) {
   device->profile_ = profile;
   const bool es3 = profile == Profile::kEs3;
   RELIT_ASSIGN(device->gl_, load_functions(options.get_proc_address, es3));
+  device->caps_.version = version;
+  StateGuard guard(*device);
   RELIT_ASSIGN(device->caps_,
                query_capabilities(device->gl_, version, es3 ? 3 : 2, options.ignored_extensions));
+  load_optional_functions(options.get_proc_address, device->caps_.reset_status,
+                          !es3 && device->caps_.vertex_array_object, device->gl_);
   const Functions& gl = device->gl_;
   device->triangle_ = Buffer(gl);
   if (es3) {
@@ -80,7 +84,22 @@ void Device::draw_fullscreen() const {
   gl_.BindBuffer(GL_ARRAY_BUFFER, 0);
 }
 
+Status Device::ready(const char* operation) const {
+  const char* reason = nullptr;
+  if (abandoned_) {
+    reason = "was abandoned";
+  } else if (gl_.GetString(GL_VERSION) == nullptr) {
+    reason = "is not current on this thread";
+  } else if (gl_.GetGraphicsResetStatus != nullptr && gl_.GetGraphicsResetStatus() != GL_NO_ERROR) {
+    reason = "was lost";
+  }
+  if (reason == nullptr) return {};
+  return fail(ErrorCode::kEnvironment,
+              std::string("the OpenGL ES context ") + reason + " while " + operation);
+}
+
 Status Device::check(const char* operation) const {
+  RELIT_TRY(ready(operation));
   const GLenum error = gl_.GetError();
   if (error == GL_NO_ERROR) return {};
   char code[16];
@@ -89,34 +108,90 @@ Status Device::check(const char* operation) const {
               std::string("OpenGL ES error ") + code + " while " + operation);
 }
 
-StateGuard::StateGuard(const Device& device, int units) : gl_(device.gl()), units_(units) {
+void Device::abandon() {
+  abandoned_ = true;
+  forget_deletions(gl_);
+}
+
+StateGuard::StateGuard(const Device& device, int units)
+    : device_(device), gl_(device.gl()), units_(units) {
   gl_.GetIntegerv(GL_FRAMEBUFFER_BINDING, &framebuffer_);
+  if (device.is_es3()) gl_.GetIntegerv(GL_READ_FRAMEBUFFER_BINDING, &read_framebuffer_);
   gl_.GetIntegerv(GL_VIEWPORT, viewport_);
-  gl_.Disable(GL_BLEND);
-  gl_.Disable(GL_DEPTH_TEST);
-  gl_.Disable(GL_CULL_FACE);
-  gl_.Disable(GL_SCISSOR_TEST);
-  gl_.ColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
-  gl_.DepthMask(GL_TRUE);
-  if (device.is_es3()) gl_.BindVertexArray(0);
+  gl_.GetIntegerv(GL_SCISSOR_BOX, scissor_);
+  unbind();
+  set_defaults();
+  gl_.Disable(GL_DITHER);
 }
 
 StateGuard::~StateGuard() {
+  unbind();
+  set_defaults();
+  gl_.Enable(GL_DITHER);
+  gl_.BindFramebuffer(GL_FRAMEBUFFER, static_cast<GLuint>(framebuffer_));
+  if (device_.is_es3() && read_framebuffer_ != framebuffer_)
+    gl_.BindFramebuffer(GL_READ_FRAMEBUFFER, static_cast<GLuint>(read_framebuffer_));
+  gl_.Viewport(viewport_[0], viewport_[1], viewport_[2], viewport_[3]);
+  gl_.Scissor(scissor_[0], scissor_[1], scissor_[2], scissor_[3]);
+}
+
+void StateGuard::unbind() const {
   gl_.UseProgram(0);
+  // Vertex arrays first: the element buffer belongs to the one that is bound.
+  if (device_.is_es3()) {
+    gl_.BindVertexArray(0);
+    gl_.BindBuffer(GL_PIXEL_UNPACK_BUFFER, 0);
+    gl_.BindBuffer(GL_PIXEL_PACK_BUFFER, 0);
+  } else {
+    if (gl_.BindVertexArrayOES != nullptr) gl_.BindVertexArrayOES(0);
+    for (int i = 0; i < device_.caps().max_vertex_attributes; ++i)
+      gl_.DisableVertexAttribArray(static_cast<GLuint>(i));
+  }
   gl_.BindBuffer(GL_ARRAY_BUFFER, 0);
+  gl_.BindBuffer(GL_ELEMENT_ARRAY_BUFFER, 0);
+  gl_.BindRenderbuffer(GL_RENDERBUFFER, 0);
   for (int unit = units_ - 1; unit >= 0; --unit) {
     gl_.ActiveTexture(GL_TEXTURE0 + static_cast<GLenum>(unit));
     gl_.BindTexture(GL_TEXTURE_2D, 0);
+    gl_.BindTexture(GL_TEXTURE_CUBE_MAP, 0);
+    if (device_.is_es3()) gl_.BindSampler(static_cast<GLuint>(unit), 0);
   }
-  gl_.Disable(GL_BLEND);
-  gl_.Disable(GL_DEPTH_TEST);
-  gl_.Disable(GL_CULL_FACE);
-  gl_.Disable(GL_SCISSOR_TEST);
+}
+
+void StateGuard::set_defaults() const {
+  constexpr GLenum kSampleMask = 0x8E51;
+  for (const GLenum state :
+       {GL_BLEND, GL_DEPTH_TEST, GL_CULL_FACE, GL_SCISSOR_TEST, GL_STENCIL_TEST,
+        GL_POLYGON_OFFSET_FILL, GL_SAMPLE_COVERAGE, GL_SAMPLE_ALPHA_TO_COVERAGE})
+    gl_.Disable(state);
+  if (device_.is_es3()) gl_.Disable(GL_RASTERIZER_DISCARD);
+  const ContextVersion& version = device_.caps().version;
+  if (device_.is_es3() && (!version.is_es || version.major > 3 || version.minor >= 1))
+    gl_.Disable(kSampleMask);
+  gl_.ColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
   gl_.DepthMask(GL_TRUE);
+  gl_.BlendEquation(GL_FUNC_ADD);
+  gl_.BlendFunc(GL_ONE, GL_ZERO);
+  gl_.DepthFunc(GL_LESS);
+  gl_.DepthRangef(0, 1);
+  gl_.CullFace(GL_BACK);
+  gl_.FrontFace(GL_CCW);
+  gl_.ClearColor(0, 0, 0, 0);
+  gl_.ClearDepthf(1);
+  set_pixel_store();
+}
+
+void StateGuard::set_pixel_store() const {
   gl_.PixelStorei(GL_UNPACK_ALIGNMENT, 4);
   gl_.PixelStorei(GL_PACK_ALIGNMENT, 4);
-  gl_.BindFramebuffer(GL_FRAMEBUFFER, static_cast<GLuint>(framebuffer_));
-  gl_.Viewport(viewport_[0], viewport_[1], viewport_[2], viewport_[3]);
+  if (device_.caps().unpack_row_length || device_.is_es3())
+    for (const GLenum parameter :
+         {GL_UNPACK_ROW_LENGTH, GL_UNPACK_SKIP_ROWS, GL_UNPACK_SKIP_PIXELS})
+      gl_.PixelStorei(parameter, 0);
+  if (!device_.is_es3()) return;
+  for (const GLenum parameter : {GL_UNPACK_IMAGE_HEIGHT, GL_UNPACK_SKIP_IMAGES, GL_PACK_ROW_LENGTH,
+                                 GL_PACK_SKIP_ROWS, GL_PACK_SKIP_PIXELS})
+    gl_.PixelStorei(parameter, 0);
 }
 
 Texture make_texture(const Device& device, const TextureFormat& format, int width, int height,

@@ -21,13 +21,28 @@ struct DeviceOptions {
 /// calling thread for every call to an object of this folder, construction and destruction
 /// included.
 ///
-/// GL state. Every public operation of this folder sets all the state it needs and leaves: the
-/// framebuffer binding and the viewport as they were; no program, vertex array (ES 3) or buffer
-/// bound and no attribute array enabled; every texture unit it used empty and unit 0 active;
-/// blending, depth test, culling and scissor test off; colour and depth masks on; pixel-store
-/// parameters at GL's defaults. It expects what only a host would change to be at GL's defaults:
-/// stencil test, polygon offset and sample coverage off, no pixel buffers bound, blend equation
-/// ADD.
+/// GL state. Every public operation of this folder sets all the state that it needs, whatever the
+/// host left, and leaves:
+///
+/// - framebuffers (ES 3: drawing and reading), viewport and scissor box as they were (but see
+///   Framebuffer::bind());
+/// - no program, renderbuffer, array buffer, element buffer or vertex array bound; ES 3: no pixel
+///   pack or unpack buffer bound;
+/// - attribute arrays disabled (ES 3: those of vertex array 0 are not touched); the value of
+///   attribute 3 (1, 1, 1, 1) if anything was drawn;
+/// - unit 0 active; no 2D or cube texture and no sampler bound to the units used (at most 16, from
+///   0);
+/// - off: blend, depth, cull, scissor and stencil test, polygon offset, sample coverage, sample
+///   alpha to coverage; ES 3: rasterizer discard; ES 3.1: sample mask;
+/// - on: dithering, all colour and depth masks;
+/// - at GL's defaults: blend equation and function, depth function and range, cull face, front
+///   face, clear colour and depth, pixel store.
+///
+/// Everything else is neither changed nor looked at, but for what no operation can do without: no
+/// transform feedback may be active, and a framebuffer of the host's that is drawn into must be
+/// complete and not encode sRGB by itself.
+///
+/// A context that is lost, or not current, makes operations fail with kEnvironment; see abandon().
 class Device {
  public:
   /// Loads entry points and asks for capabilities. Errors: kEnvironment when the context is older
@@ -46,8 +61,16 @@ class Device {
   /// inside it. Inside a StateGuard.
   void draw_fullscreen() const;
 
+  /// Whether the context is there: for the beginnings of public operations. Errors: kEnvironment
+  /// where it is not current on this thread, was lost, or was abandoned.
+  [[nodiscard]] Status ready(const char* operation) const;
   /// A message for any pending GL error, naming the operation; for the ends of public operations.
+  /// Errors: kOutOfMemory, kEnvironment.
   [[nodiscard]] Status check(const char* operation) const;
+
+  /// Says that the context is gone, and its objects with it: objects of this folder can then be
+  /// destroyed without one, and do nothing but fail until they are.
+  void abandon();
 
  private:
   Device() = default;
@@ -55,26 +78,35 @@ class Device {
   Functions gl_;
   Capabilities caps_;
   Profile profile_ = Profile::kEs3;
+  bool abandoned_ = false;
   Buffer triangle_;
   VertexArray triangle_array_;
 };
 
-/// Puts back the state that Device promises to leave, at the end of a public operation.
+/// Sets the state that an operation counts on, and at its end what Device promises to leave.
 class StateGuard {
  public:
+  /// `units`: of the textures that the operation uses, from 0.
   explicit StateGuard(const Device& device, int units = 1);
   ~StateGuard();
   StateGuard(const StateGuard&) = delete;
   StateGuard& operator=(const StateGuard&) = delete;
 
-  /// The framebuffer that was bound when the guard was made.
+  /// The framebuffer that was bound for drawing when the guard was made.
   [[nodiscard]] GLuint framebuffer() const { return static_cast<GLuint>(framebuffer_); }
 
  private:
+  void set_defaults() const;
+  void set_pixel_store() const;
+  void unbind() const;
+
+  const Device& device_;
   const Functions& gl_;
   int units_;
   GLint framebuffer_ = 0;
+  GLint read_framebuffer_ = 0;
   GLint viewport_[4] = {};
+  GLint scissor_[4] = {};
 };
 
 /// A 2D texture's storage and sampling in one call; leaves it bound to the active unit.

@@ -26,4 +26,23 @@ Result<Functions> load_functions(const GetProcAddress& get_proc_address, bool es
   return gl;
 }
 
+void load_optional_functions(const GetProcAddress& get_proc_address, const char* reset_status,
+                             bool vertex_arrays, Functions& gl) {
+  auto load = [&]<class F>(F& function, const char* name) {
+    function = std::bit_cast<F>(get_proc_address(name));
+  };
+  if (reset_status != nullptr) load(gl.GetGraphicsResetStatus, reset_status);
+  if (vertex_arrays) load(gl.BindVertexArrayOES, "glBindVertexArrayOES");
+}
+
+void forget_deletions(Functions& gl) {
+  gl.DeleteBuffers = [](GLsizei, const GLuint*) {};
+  gl.DeleteFramebuffers = [](GLsizei, const GLuint*) {};
+  gl.DeleteProgram = [](GLuint) {};
+  gl.DeleteRenderbuffers = [](GLsizei, const GLuint*) {};
+  gl.DeleteShader = [](GLuint) {};
+  gl.DeleteTextures = [](GLsizei, const GLuint*) {};
+  gl.DeleteVertexArrays = [](GLsizei, const GLuint*) {};
+}
+
 }  // namespace relit::gles

@@ -47,6 +47,7 @@ using GetProcAddress = std::function<void*(const char* name)>;
   X(DeleteTextures, PFNGLDELETETEXTURESPROC)                     \
   X(DepthFunc, PFNGLDEPTHFUNCPROC)                               \
   X(DepthMask, PFNGLDEPTHMASKPROC)                               \
+  X(DepthRangef, PFNGLDEPTHRANGEFPROC)                           \
   X(Disable, PFNGLDISABLEPROC)                                   \
   X(DisableVertexAttribArray, PFNGLDISABLEVERTEXATTRIBARRAYPROC) \
   X(DrawArrays, PFNGLDRAWARRAYSPROC)                             \
@@ -97,6 +98,7 @@ using GetProcAddress = std::function<void*(const char* name)>;
   X(Viewport, PFNGLVIEWPORTPROC)
 
 #define RELIT_GL_ES3_FUNCTIONS(X)                    \
+  X(BindSampler, PFNGLBINDSAMPLERPROC)               \
   X(BindVertexArray, PFNGLBINDVERTEXARRAYPROC)       \
   X(BlitFramebuffer, PFNGLBLITFRAMEBUFFERPROC)       \
   X(DeleteVertexArrays, PFNGLDELETEVERTEXARRAYSPROC) \
@@ -104,12 +106,18 @@ using GetProcAddress = std::function<void*(const char* name)>;
   X(GetStringi, PFNGLGETSTRINGIPROC)                 \
   X(RenderbufferStorageMultisample, PFNGLRENDERBUFFERSTORAGEMULTISAMPLEPROC)
 
+// Null where the context has none.
+#define RELIT_GL_OPTIONAL_FUNCTIONS(X)               \
+  X(BindVertexArrayOES, PFNGLBINDVERTEXARRAYOESPROC) \
+  X(GetGraphicsResetStatus, PFNGLGETGRAPHICSRESETSTATUSEXTPROC)
+
 /// The entry points that this folder calls, named without their "gl". Those of ES 3 are null in a
 /// table that was loaded for ES 2, so that nothing of ES 3 can slip into an ES 2 path.
 struct Functions {
 #define RELIT_GL_MEMBER(name, type) type name = nullptr;
   RELIT_GL_ES2_FUNCTIONS(RELIT_GL_MEMBER)
   RELIT_GL_ES3_FUNCTIONS(RELIT_GL_MEMBER)
+  RELIT_GL_OPTIONAL_FUNCTIONS(RELIT_GL_MEMBER)
 #undef RELIT_GL_MEMBER
 
   [[nodiscard]] bool is_es3() const { return BindVertexArray != nullptr; }
@@ -118,5 +126,14 @@ struct Functions {
 /// Loads the ES 2 entry points, and those of ES 3 if `es3`. The context must be current. Errors:
 /// kEnvironment, naming the first entry point that is missing.
 [[nodiscard]] Result<Functions> load_functions(const GetProcAddress& get_proc_address, bool es3);
+
+/// Loads what a context has besides: the reset status under the name that its version or extension
+/// gives it (null: none), and vertex arrays of ES 2. (An address alone does not prove that the
+/// context has a function.)
+void load_optional_functions(const GetProcAddress& get_proc_address, const char* reset_status,
+                             bool vertex_arrays, Functions& gl);
+
+/// Makes deleting GL objects do nothing, for a context that is gone with all its objects.
+void forget_deletions(Functions& gl);
 
 }  // namespace relit::gles

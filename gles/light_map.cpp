@@ -78,6 +78,36 @@ Status read_float_pixels(const Device& device, int width, int height, std::span<
   return device.check("reading half-float pixels");
 }
 
+Status read_light_map(const Device& device, const LightMap& map, std::span<float> pixels,
+                      std::span<float> out) {
+  if (map.square_root) {
+    device.gl().ReadPixels(0, 0, map.width, map.height, GL_RGBA, GL_UNSIGNED_BYTE, pixels.data());
+    RELIT_TRY(device.check("reading a light map back"));
+  } else {
+    RELIT_TRY(read_float_pixels(device, map.width, map.height, pixels));
+  }
+  const auto* bytes = reinterpret_cast<const std::uint8_t*>(pixels.data());
+  const std::size_t texels = out.size() / 3;
+  for (std::size_t i = 0; i < texels; ++i) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      float value = pixels[4 * i + c];
+      if (map.square_root) {
+        value = static_cast<float>(bytes[4 * i + c]) / 255.0f;
+        value *= value;
+      }
+      out[c * texels + i] = value * map.scale;
+    }
+  }
+  return {};
+}
+
+// Texel X of the half map is texel 2X of the full one: full coordinate p = u·W is X + ½ = p/2 + ¼.
+std::array<float, 4> half_place(int width, int height) {
+  const double w = half_side(width), h = half_side(height);
+  return {static_cast<float>(0.5 * width / w), static_cast<float>(0.5 * height / h),
+          static_cast<float>(0.25 / w), static_cast<float>(0.25 / h)};
+}
+
 Result<LightMapStorage> choose_light_map_storage(const Device& device, LightMapFormat wanted,
                                                  bool render) {
   const Capabilities& caps = device.caps();
@@ -118,6 +148,7 @@ Result<LightMapStorage> choose_light_map_storage(const Device& device, LightMapF
 
 Result<LightMapUploader> LightMapUploader::create(const Device& device, int width, int height,
                                                   LightMapFormat format) {
+  RELIT_TRY(device.ready("creating a light map"));
   const int limit =
       std::min(static_cast<int>(limits::kLightMapSide), device.caps().max_texture_size);
   if (width < 1 || height < 1)
@@ -159,13 +190,15 @@ Result<LightMap> LightMapUploader::upload(std::span<const float> composite, floa
   } else {
     pack_half(composite);
   }
+  RELIT_TRY(device_->ready("uploading a light map"));
   next_ = 1 - next_;
   map.texture = textures_[next_].name();
   const Functions& gl = device_->gl();
+  StateGuard guard(*device_);
+  gl.PixelStorei(GL_UNPACK_ALIGNMENT, 1);
   gl.BindTexture(GL_TEXTURE_2D, map.texture);
   gl.TexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, width_, height_, storage_.texture.format,
                    storage_.texture.type, texels_.data());
-  gl.BindTexture(GL_TEXTURE_2D, 0);
   RELIT_TRY(device_->check("uploading a light map"));
   return map;
 }

@@ -11,10 +11,14 @@
 
 namespace relit::gles {
 
-/// A light map on the GPU, for CharacterRenderer::draw(). Belongs to the object that made it and is
-/// valid until that object makes the next one.
+/// A light map on the GPU, for CharacterRenderer::draw() and for hosts that draw themselves.
+/// Belongs to the object that made it and is valid until that object makes the next one.
+///
+///     radiance for albedo 1 = max(0, texel filtered at place.xy·uv + place.zw) × scale × magnitude
+///
+/// where a texel that is a square root is squared after filtering.
 struct LightMap {
-  GLuint texture = 0;  ///< RGBA, row 0 is v = 0, clamped at the edges
+  GLuint texture = 0;  ///< RGBA, row 0 is v = 0, clamped at the edges, linear where filterable
   int width = 0;
   int height = 0;
   bool square_root = false;  ///< texels are square roots
@@ -22,7 +26,14 @@ struct LightMap {
       true;             ///< false: the format cannot be filtered here, shaders take four texels
   float scale = 1;      ///< composite = texel (squared, if square_root) × scale
   float magnitude = 1;  ///< exit radiance for albedo 1 = composite × magnitude
+  /// From light-map coordinates to the texture's: (1, 1, 0, 0), but for maps of half size, whose
+  /// texels are every second one of the full map and lie where those lie.
+  std::array<float, 4> place{1, 1, 0, 0};
 };
+
+/// A light map's sides at half size, and their LightMap::place.
+[[nodiscard]] constexpr int half_side(int side) { return (side + 1) / 2; }
+[[nodiscard]] std::array<float, 4> half_place(int width, int height);
 
 /// Which of the formats a light map of this device gets, as a texture format. `render` asks for one
 /// that can be drawn into. Errors: kUnsupported when the one asked for does not exist here.
@@ -73,5 +84,11 @@ class LightMapUploader {
 /// values. A half-float one may give only half floats (ES 2), which are converted. Errors:
 /// kEnvironment from GL.
 Status read_float_pixels(const Device& device, int width, int height, std::span<float> rgba);
+
+/// Reads a light map whose texture is the colour of the framebuffer that is bound into
+/// [3][height][width], texels times `map.scale`. `pixels` is room for 4 × width × height values.
+/// Errors: kEnvironment from GL.
+Status read_light_map(const Device& device, const LightMap& map, std::span<float> pixels,
+                      std::span<float> out);
 
 }  // namespace relit::gles

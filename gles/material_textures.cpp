@@ -46,6 +46,7 @@ Status check_material(const MaterialView& material, std::size_t index, std::size
 Result<MaterialTextures> MaterialTextures::create(const Device& device,
                                                   std::span<const ImageView> images,
                                                   std::span<const MaterialView> materials) {
+  RELIT_TRY(device.ready("uploading the materials' images"));
   MaterialTextures result;
   StateGuard guard(device);
   for (std::size_t i = 0; i < images.size(); ++i) RELIT_TRY(check_image(images[i], i));

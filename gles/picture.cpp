@@ -8,6 +8,7 @@
 namespace relit::gles {
 
 Result<Framebuffer> Framebuffer::create(const Device& device, const FramebufferOptions& options) {
+  RELIT_TRY(device.ready("creating a picture"));
   const Capabilities& caps = device.caps();
   GLint limit = 0;
   device.gl().GetIntegerv(GL_MAX_RENDERBUFFER_SIZE, &limit);
@@ -104,6 +105,7 @@ void Framebuffer::bind() const {
 }
 
 Status Framebuffer::resolve() {
+  RELIT_TRY(device_->ready("resolving a picture"));
   const Functions& gl = device_->gl();
   StateGuard guard(*device_);
   if (multisamples_ > 0) {
@@ -128,6 +130,7 @@ void Framebuffer::draw_picture(const Texture& source) const {
 }
 
 Status Framebuffer::present(GLuint framebuffer, int width, int height) const {
+  RELIT_TRY(device_->ready("presenting a picture"));
   const Functions& gl = device_->gl();
   StateGuard guard(*device_);
   gl.BindFramebuffer(GL_FRAMEBUFFER, framebuffer);
@@ -142,6 +145,7 @@ Status Framebuffer::read_back(std::span<std::uint8_t> rgba, bool straight) const
     return fail(ErrorCode::kInvalid, "reading back a picture needs room for " +
                                          std::to_string(row * static_cast<std::size_t>(height_)) +
                                          " bytes, not " + std::to_string(rgba.size()));
+  RELIT_TRY(device_->ready("reading a picture back"));
   const Functions& gl = device_->gl();
   StateGuard guard(*device_);
   gl.BindFramebuffer(GL_FRAMEBUFFER, levels_.back().framebuffer.name());

@@ -21,6 +21,7 @@ struct PlaneDescription {
   int bit_depth = 8;       ///< 8 or 10: mantissa_zero is 128 or 512; 10 bits take two bytes
   int mantissa_shift = 0;  ///< as PlaneView's
   PicturePlace mantissa;
+  unsigned channels = 7;  ///< bits 0..2: of the light map, that the plane ever has a weight for
   bool has_exponent = false;
   int exponent_shift = 0;  ///< as PlaneView's
   PicturePlace

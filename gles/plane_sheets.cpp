@@ -25,13 +25,24 @@ Result<PlaneSheets> PlaneSheets::create(const Device& device,
                                         const PlaneSetDescription& description) {
   PlaneSheets sheets;
   sheets.device_ = &device;
-  sheets.ring_size_ = description.changes_every_frame ? 2 : 1;
-  RELIT_TRY(sheets.describe(description));
-  const int limit = std::min(kSheetSide, device.caps().max_texture_size);
-  sheets.make_regions(description, limit);
-  RELIT_TRY(sheets.pack(limit));
+  RELIT_TRY(sheets.lay_out(description, device.caps().max_texture_size));
   sheets.make_textures();
   return sheets;
+}
+
+Result<PlaneSheets::Bytes> PlaneSheets::measure(const PlaneSetDescription& description,
+                                                int max_texture_size) {
+  PlaneSheets sheets;
+  RELIT_TRY(sheets.lay_out(description, max_texture_size));
+  return Bytes{sheets.gpu_bytes(), sheets.largest_region_bytes()};
+}
+
+Status PlaneSheets::lay_out(const PlaneSetDescription& description, int max_texture_size) {
+  slot_count_ = description.changes_every_frame ? 2 : 1;
+  RELIT_TRY(describe(description));
+  const int limit = std::min(kSheetSide, max_texture_size);
+  make_regions(description, limit);
+  return pack(limit);
 }
 
 Status PlaneSheets::describe(const PlaneSetDescription& d) {
@@ -48,7 +59,8 @@ Status PlaneSheets::describe(const PlaneSetDescription& d) {
   planes_ = d.planes;
   mantissas_.resize(planes_.size());
   exponents_.resize(planes_.size());
-  states_.resize(planes_.size());
+  for (std::vector<PlaneState>& states : states_) states.resize(planes_.size());
+  active_.resize(planes_.size());
   for (std::size_t k = 0; k < planes_.size(); ++k) {
     const PlaneDescription& plane = planes_[k];
     if ((plane.bit_depth != 8 && plane.bit_depth != 10) || plane.mantissa_shift < 0 ||
@@ -215,15 +227,11 @@ void PlaneSheets::make_textures() {
       format.format = sheet.wide ? GL_LUMINANCE_ALPHA : GL_LUMINANCE;
       format.internal_format = static_cast<GLint>(format.format);
     }
-    for (int i = 0; i < ring_size_; ++i)
+    for (int i = 0; i < slot_count_; ++i)
       sheet.textures[static_cast<std::size_t>(i)] =
           make_texture(*device_, format, sheet.width, sheet.height);
   }
-  std::size_t largest = 0;
   for (const Region& region : regions_) {
-    largest =
-        std::max(largest, static_cast<std::size_t>(region.width) *
-                              static_cast<std::size_t>(region.height) * (region.wide ? 2 : 1));
     for (const std::uint32_t t : region.tiles) {
       const Tile& tile = tiles_[t];
       for (const std::uint32_t plane : tile.planes) {
@@ -235,21 +243,43 @@ void PlaneSheets::make_textures() {
     }
   }
   // Rows of a picture are longer than the region's. Without a row length they are copied together.
-  staging_.resize(largest);
+  staging_.resize(largest_region_bytes());
 }
 
-Status PlaneSheets::upload(std::span<const PlaneView> planes) {
-  if (planes.size() != planes_.size())
+std::size_t PlaneSheets::largest_region_bytes() const {
+  std::size_t largest = 0;
+  for (const Region& region : regions_) {
+    largest =
+        std::max(largest, static_cast<std::size_t>(region.width) *
+                              static_cast<std::size_t>(region.height) * (region.wide ? 2 : 1));
+  }
+  return largest;
+}
+
+Status PlaneSheets::upload(std::span<const PlaneView> planes, int slot,
+                           std::span<const std::uint8_t> wanted, bool keep) {
+  if (planes.size() != planes_.size() || (!wanted.empty() && wanted.size() != planes_.size()))
     return fail(ErrorCode::kInvalid, std::to_string(planes.size()) + " planes to upload, " +
                                          std::to_string(planes_.size()) + " were described");
-  for (std::size_t k = 0; k < planes.size(); ++k)
-    if (!planes[k].mantissa.empty()) RELIT_TRY(check_view(k, planes[k]));
-
-  ring_at_ = (ring_at_ + 1) % ring_size_;
+  if (slot < 0 || slot >= slot_count_)
+    return fail(ErrorCode::kInvalid,
+                "planes for slot " + std::to_string(slot) + " of " + std::to_string(slot_count_));
+  std::vector<PlaneState>& states = states_[static_cast<std::size_t>(slot)];
+  for (std::size_t k = 0; k < planes.size(); ++k) {
+    active_[k] = !planes[k].mantissa.empty() && (wanted.empty() || wanted[k] != 0) &&
+                 !(keep && states[k].present);
+    if (active_[k] != 0) RELIT_TRY(check_view(k, planes[k]));
+  }
   device_->gl().PixelStorei(GL_UNPACK_ALIGNMENT, 1);
-  for (const Region& region : regions_) upload_region(region, planes);
+  for (const Region& region : regions_) upload_region(region, planes, slot);
   std::fill(tile_exponents_.begin(), tile_exponents_.end(), -1);
-  for (std::size_t k = 0; k < planes.size(); ++k) note_state(k, planes[k]);
+  for (std::size_t k = 0; k < planes.size(); ++k) {
+    if (active_[k] != 0) {
+      note_state(k, planes[k], states[k]);
+    } else if (!keep) {
+      states[k] = {};
+    }
+  }
   return {};
 }
 
@@ -275,31 +305,36 @@ Status PlaneSheets::check_view(std::size_t k, const PlaneView& view) const {
 const SampleView* PlaneSheets::find_view(const Tile& tile,
                                          std::span<const PlaneView> planes) const {
   for (const std::uint32_t k : tile.planes)
-    if (!planes[k].mantissa.empty())
-      return tile.exponent ? &planes[k].exponent : &planes[k].mantissa;
+    if (active_[k] != 0) return tile.exponent ? &planes[k].exponent : &planes[k].mantissa;
   return nullptr;
 }
 
-void PlaneSheets::upload_region(const Region& region, std::span<const PlaneView> planes) {
+void PlaneSheets::upload_region(const Region& region, std::span<const PlaneView> planes, int slot) {
   const SampleView* first = nullptr;
   const std::uint8_t* origin = nullptr;
   bool one_picture = true;
+  int x0 = region.width, y0 = region.height, x1 = 0, y1 = 0;  // what has to go up
   for (const std::uint32_t t : region.tiles) {
-    const SampleView* view = find_view(tiles_[t], planes);
+    const Tile& tile = tiles_[t];
+    const SampleView* view = find_view(tile, planes);
     if (view == nullptr) continue;
-    const std::uint8_t* start = view->data - tiles_[t].y * view->stride_bytes -
-                                std::ptrdiff_t{tiles_[t].x} * view->bytes_per_sample;
+    const std::uint8_t* start =
+        view->data - tile.y * view->stride_bytes - std::ptrdiff_t{tile.x} * view->bytes_per_sample;
     if (first == nullptr) {
       first = view;
       origin = start;
     }
     one_picture = one_picture && start == origin && view->stride_bytes == first->stride_bytes;
+    x0 = std::min(x0, tile.x), x1 = std::max(x1, tile.x + tile.width);
+    y0 = std::min(y0, tile.y), y1 = std::max(y1, tile.y + tile.height);
   }
   if (first == nullptr) return;
   if (one_picture) {
-    upload_rectangle(
-        region, region.x, region.y,
-        {origin, first->stride_bytes, region.width, region.height, first->bytes_per_sample});
+    const std::uint8_t* corner =
+        origin + y0 * first->stride_bytes + std::ptrdiff_t{x0} * first->bytes_per_sample;
+    upload_rectangle(region, region.x + x0, region.y + y0,
+                     {corner, first->stride_bytes, x1 - x0, y1 - y0, first->bytes_per_sample},
+                     slot);
     return;
   }
   // The views lie elsewhere than was described, for example after an error was concealed.
@@ -309,11 +344,12 @@ void PlaneSheets::upload_region(const Region& region, std::span<const PlaneView>
     SampleView cropped = *view;
     cropped.width = tiles_[t].width;
     cropped.height = tiles_[t].height;
-    upload_rectangle(region, region.x + tiles_[t].x, region.y + tiles_[t].y, cropped);
+    upload_rectangle(region, region.x + tiles_[t].x, region.y + tiles_[t].y, cropped, slot);
   }
 }
 
-void PlaneSheets::upload_rectangle(const Region& region, int x, int y, const SampleView& samples) {
+void PlaneSheets::upload_rectangle(const Region& region, int x, int y, const SampleView& samples,
+                                   int slot) const {
   const Functions& gl = device_->gl();
   const Sheet& sheet = sheets_[static_cast<std::size_t>(region.sheet)];
   const GLenum format = device_->is_es3() ? (region.wide ? GL_RG : GL_RED)
@@ -333,16 +369,14 @@ void PlaneSheets::upload_rectangle(const Region& region, int x, int y, const Sam
                   static_cast<std::size_t>(row_bytes));
     data = staging_.data();
   }
-  gl.BindTexture(GL_TEXTURE_2D, sheet.textures[static_cast<std::size_t>(ring_at_)].name());
+  gl.BindTexture(GL_TEXTURE_2D, sheet.textures[static_cast<std::size_t>(slot)].name());
   gl.TexSubImage2D(GL_TEXTURE_2D, 0, x, y, samples.width, samples.height, format, GL_UNSIGNED_BYTE,
                    data);
   if (row_length) gl.PixelStorei(GL_UNPACK_ROW_LENGTH, 0);
 }
 
-void PlaneSheets::note_state(std::size_t k, const PlaneView& view) {
-  PlaneState& state = states_[k];
+void PlaneSheets::note_state(std::size_t k, const PlaneView& view, PlaneState& state) {
   state = {};
-  if (view.mantissa.empty()) return;
   state.present = true;
   int exponent = view.exponent_zero;
   if (planes_[k].has_exponent) {
@@ -375,17 +409,15 @@ std::array<float, 4> PlaneSheets::coordinates(const Place& place) const {
           static_cast<float>(step / width), static_cast<float>(step / height)};
 }
 
-GLuint PlaneSheets::texture(int sheet) const {
-  return sheets_[static_cast<std::size_t>(sheet)]
-      .textures[static_cast<std::size_t>(ring_at_)]
-      .name();
+GLuint PlaneSheets::texture(int sheet, int slot) const {
+  return sheets_[static_cast<std::size_t>(sheet)].textures[static_cast<std::size_t>(slot)].name();
 }
 
 std::size_t PlaneSheets::gpu_bytes() const {
   std::size_t bytes = 0;
   for (const Sheet& sheet : sheets_)
     bytes += static_cast<std::size_t>(sheet.width) * static_cast<std::size_t>(sheet.height) *
-             (sheet.wide ? 2u : 1u) * static_cast<std::size_t>(ring_size_);
+             (sheet.wide ? 2u : 1u) * static_cast<std::size_t>(slot_count_);
   return bytes;
 }
 

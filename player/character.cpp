@@ -34,9 +34,10 @@ gles::AlphaMode to_gl(container::AlphaMode mode) {
 
 }  // namespace
 
-Result<std::unique_ptr<Character>> Character::create(const ClipReader& clip,
+Result<std::unique_ptr<Character>> Character::create(const container::FileContents& contents,
+                                                     std::span<const decoders::Mesh> meshes,
                                                      const gles::Device& device) {
-  std::unique_ptr<Character> character(new Character(clip));
+  std::unique_ptr<Character> character(new Character(contents, meshes));
   RELIT_ASSIGN(character->renderer_, gles::CharacterRenderer::create(device));
   RELIT_TRY(character->set_materials());
   RELIT_TRY(character->set_meshes());
@@ -44,11 +45,10 @@ Result<std::unique_ptr<Character>> Character::create(const ClipReader& clip,
 }
 
 Status Character::set_materials() {
-  const container::FileContents& contents = clip_.contents();
   std::vector<decoders::DecodedImage> images;
   std::vector<gles::ImageView> views;
   std::vector<int> view_of_image;
-  for (const container::ImageRecord& record : contents.images) {
+  for (const container::ImageRecord& record : contents_.images) {
     auto image = decoders::decode_image(record.bytes, record.media_type);
     view_of_image.push_back(image ? static_cast<int>(images.size()) : -1);
     if (image) {
@@ -60,11 +60,11 @@ Status Character::set_materials() {
   for (const decoders::DecodedImage& image : images)
     views.push_back({image.width, image.height, image.rgba});
   std::vector<gles::MaterialView> materials;
-  for (const container::MaterialRecord& record : contents.materials) {
+  for (const container::MaterialRecord& record : contents_.materials) {
     gles::MaterialView material;
     material.base_color = record.base_color;
-    for (std::size_t i = 0; i < contents.images.size(); ++i) {
-      if (static_cast<std::int64_t>(contents.images[i].id) == record.image_id)
+    for (std::size_t i = 0; i < contents_.images.size(); ++i) {
+      if (static_cast<std::int64_t>(contents_.images[i].id) == record.image_id)
         material.image = view_of_image[i];
     }
     material.wrap_u = to_gl(record.wrap_u), material.wrap_v = to_gl(record.wrap_v);
@@ -77,10 +77,10 @@ Status Character::set_materials() {
 }
 
 Status Character::set_meshes() {
-  const std::vector<container::MaterialRecord>& materials = clip_.contents().materials;
+  const std::vector<container::MaterialRecord>& materials = contents_.materials;
   std::vector<gles::MeshView> views;
   std::size_t most = 0;
-  for (const decoders::Mesh& mesh : clip_.meshes()) {
+  for (const decoders::Mesh& mesh : meshes_) {
     gles::MeshView view;
     view.vertex_count = mesh.positions.size();
     view.lightmap_uv = mesh.lightmap_uv;
@@ -99,8 +99,8 @@ Status Character::set_meshes() {
 }
 
 Status Character::pose(const decoders::Pose& pose) {
-  for (std::size_t m = 0; m < clip_.meshes().size(); ++m) {
-    const decoders::Mesh& mesh = clip_.meshes()[m];
+  for (std::size_t m = 0; m < meshes_.size(); ++m) {
+    const decoders::Mesh& mesh = meshes_[m];
     const std::span<glm::vec3> positions(positions_.data(), mesh.positions.size());
     decoders::pose_mesh(mesh, m, pose, positions, {});
     RELIT_TRY(renderer_->update_positions(m, positions));

@@ -2,22 +2,26 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "container/base/result.hpp"
+#include "container/reader.hpp"
+#include "decoders/mesh.hpp"
+#include "decoders/pose.hpp"
 #include "gles/character_renderer.hpp"
-#include "player/clip_reader.hpp"
 
 namespace relit::player {
 
 /// The meshes and materials of a clip in GL: what a frame's pose and light map are drawn with.
 class Character {
  public:
-  /// Decodes the albedo images and uploads everything that stays the same. `clip` and `device`
-  /// outlive this object. An image that does not decode is a warning, and its material goes
-  /// without. Errors: those of gles::CharacterRenderer.
-  static Result<std::unique_ptr<Character>> create(const ClipReader& clip,
+  /// Decodes the albedo images and uploads everything that stays the same. `contents`, `meshes` and
+  /// `device` outlive this object. An image that does not decode is a warning, and its material
+  /// goes without. Errors: those of gles::CharacterRenderer.
+  static Result<std::unique_ptr<Character>> create(const container::FileContents& contents,
+                                                   std::span<const decoders::Mesh> meshes,
                                                    const gles::Device& device);
 
   /// Poses the meshes. Steady state allocates nothing. Errors: kInvalid.
@@ -27,11 +31,13 @@ class Character {
   [[nodiscard]] const std::vector<std::string>& warnings() const { return warnings_; }
 
  private:
-  explicit Character(const ClipReader& clip) : clip_(clip) {}
+  Character(const container::FileContents& contents, std::span<const decoders::Mesh> meshes)
+      : contents_(contents), meshes_(meshes) {}
   Status set_materials();
   Status set_meshes();
 
-  const ClipReader& clip_;
+  const container::FileContents& contents_;
+  std::span<const decoders::Mesh> meshes_;
   std::unique_ptr<gles::CharacterRenderer> renderer_;
   std::vector<glm::vec3> positions_;
   std::vector<std::string> warnings_;

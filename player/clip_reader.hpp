@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -10,11 +9,10 @@
 
 #include "container/base/result.hpp"
 #include "container/byte_source.hpp"
-#include "container/reader.hpp"
-#include "container/timeline.hpp"
-#include "decoders/mesh.hpp"
 #include "decoders/plane_decoder.hpp"
 #include "decoders/pose.hpp"
+#include "player/clip_demuxer.hpp"
+#include "player/clip_frame.hpp"
 
 namespace relit::player {
 
@@ -33,24 +31,9 @@ struct ClipOptions {
   [[nodiscard]] bool spares_bytes() const { return sparing || layers >= 0 || !planes; }
 };
 
-/// What was lost to damage so far.
-struct PlaybackLoss {
-  std::uint64_t frames = 0;    ///< shown with older planes or poses
-  std::uint64_t records = 0;   ///< dropped because they were damaged
-  std::uint64_t segments = 0;  ///< that never came, by the gaps in their numbers
-  std::string first;           ///< the first reason, for the user
-  [[nodiscard]] bool any() const { return frames != 0 || !first.empty(); }
-};
-
-/// One frame, decoded. Reuse one object from frame to frame.
-struct ClipFrame {
-  decoders::FrameView planes;
-  decoders::Pose pose;
-};
-
-/// One clip of a file as a sequence of frames: reads segments as they are needed, decodes planes
-/// and poses, holds the last good frame over damage, and says what was lost. Going forward never
-/// seeks; going back needs a source that can. One thread at a time.
+/// One clip of a file as a sequence of frames: a ClipDemuxer and decoders on the caller's thread.
+/// Reads segments as they are needed, holds the last good frame over damage, and says what was
+/// lost. Going forward never seeks; going back needs a source that can. One thread at a time.
 class ClipReader {
  public:
   /// Reads everything static. `name` is for messages. Where options.spares_bytes(), the source is
@@ -60,11 +43,13 @@ class ClipReader {
   static Result<ClipReader> open(std::unique_ptr<container::ByteSource> source,
                                  const std::string& name, const ClipOptions& options);
 
-  [[nodiscard]] const container::FileContents& contents() const { return contents_; }
-  [[nodiscard]] const container::ClipRecord& clip() const { return clip_; }
-  [[nodiscard]] const container::ModelRecord& model() const { return model_; }
-  [[nodiscard]] const std::vector<container::LayerRecord>& layers() const { return layers_; }
-  [[nodiscard]] const std::vector<decoders::Mesh>& meshes() const { return meshes_; }
+  [[nodiscard]] const container::FileContents& contents() const { return demuxer_.contents(); }
+  [[nodiscard]] const container::ClipRecord& clip() const { return demuxer_.clip(); }
+  [[nodiscard]] const container::ModelRecord& model() const { return demuxer_.model(); }
+  [[nodiscard]] const std::vector<container::LayerRecord>& layers() const {
+    return demuxer_.layers();
+  }
+  [[nodiscard]] const std::vector<decoders::Mesh>& meshes() const { return demuxer_.meshes(); }
   [[nodiscard]] PlaybackLoss loss() const;
 
   /// Decodes frame `index` of the clip. Errors: kNotFound beyond the clip, or behind what was read
@@ -82,52 +67,32 @@ class ClipReader {
   [[nodiscard]] std::uint32_t ticks_of(std::uint64_t index) const;
 
  private:
-  ClipReader(container::Reader reader, std::string name)
-      : reader_(std::move(reader)), name_(std::move(name)) {}
+  ClipReader(ClipDemuxer demuxer, decoders::PoseTrack poses)
+      : demuxer_(std::move(demuxer)), poses_(std::move(poses)) {}
 
   static Result<ClipReader> open_clip(std::unique_ptr<container::ByteSource> source,
                                       const std::string& name, const ClipOptions& options);
+  Status open_planes(const ClipOptions& options);
   Status decode_frame(std::uint64_t index, ClipFrame& out);
   Result<std::uint64_t> find_frame(std::uint64_t tick);
-  Status choose_clip(const std::string& wanted);
   Status read_until(std::uint64_t index);
-  Status load_index();
-  void note_segment(const container::IndexRecord::Entry& entry);
-  Result<bool> jump(std::uint64_t index);
-  Status take(container::Record record);
-  void note_arrival(std::uint32_t track_id);
+  Status read_record(std::uint64_t target);
+  Status take_chunk();
   Status decode(std::uint64_t index);
-  Status note_damage(const Error& error);
   void forget_before(std::uint64_t index);
-  [[nodiscard]] Unexpected in_file(const Error& error) const;
+  void forget_all();
 
-  container::Reader reader_;
-  std::string name_;
-  container::FileContents contents_;
-  container::ClipRecord clip_;
-  container::ModelRecord model_;
-  std::vector<container::LayerRecord> layers_;
-  std::uint32_t pose_track_ = 0;
-  std::vector<decoders::Mesh> meshes_;
-  std::optional<decoders::PoseTrack> poses_;
+  ClipDemuxer demuxer_;
+  decoders::PoseTrack poses_;
   std::optional<decoders::PlaneDecoder> planes_;
-  std::vector<std::uint32_t> tracks_;  ///< wanted, sorted
-  container::Timeline timeline_;
-  std::map<std::uint64_t, container::IndexRecord::Entry> segments_;  ///< known ones, by first frame
-  std::map<std::uint64_t, std::uint64_t> first_frames_;              ///< of the same, by first tick
-  bool index_loaded_ = false;
-  std::optional<container::SegmentRecord> segment_;  ///< whose chunks are coming in
-  std::uint32_t last_chunk_ = 0;                     ///< track of the last one that is wanted
-  std::uint64_t wanted_frame_ = 0;                   ///< that read_until() is on its way to
-  std::vector<std::uint32_t> first_picture_;         ///< tracks that an impatient first frame needs
-  std::vector<std::uint32_t> missing_;               ///< those of them that the segment still lacks
-  bool impatient_ = false;                           ///< until the first frame has been shown
-  std::uint64_t complete_end_ = 0;                   ///< frames before this one have come
-  std::uint64_t kept_begin_ = 0;                     ///< frames before this one have been forgotten
+  container::ChunkRecord chunk_;              ///< the last one
+  std::vector<std::uint32_t> first_picture_;  ///< tracks that an impatient first frame needs
+  std::vector<std::uint32_t> missing_;        ///< those of them that the segment still lacks
+  bool impatient_ = false;                    ///< until the first frame has been shown
+  std::uint64_t kept_begin_ = 0;              ///< frames before this one have been forgotten
   ClipFrame scratch_;
-  bool ended_ = false;
   bool shown_ = false;
-  PlaybackLoss loss_;
+  std::uint64_t lost_frames_ = 0;
 };
 
 }  // namespace relit::player

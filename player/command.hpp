@@ -70,10 +70,12 @@ struct FrameRange {
 /// A subcommand: adds itself to the application; the function runs it after parsing.
 using Command = std::function<int()>;
 Command add_info(CLI::App& app);
+Command add_plan(CLI::App& app);
 Command add_dump(CLI::App& app);
 Command add_light(CLI::App& app);
 Command add_render(CLI::App& app);
 Command add_play(CLI::App& app);
+Command add_stream(CLI::App& app);
 Command add_validate(CLI::App& app);
 Command add_recover(CLI::App& app);
 Command add_remux(CLI::App& app);

@@ -9,18 +9,48 @@ namespace {
 
 struct Arguments {
   LightArguments light;
+  std::vector<std::string> environments;
+  std::vector<double> times_s;
   std::string output;
   int order = 3;
+  bool loop = false, step = false;
+  double period_s = 0;
 };
 
+// One light, or one for each time.
+Result<LightField> make_field(const Arguments& arguments) {
+  if (arguments.times_s.size() != arguments.environments.size() &&
+      !(arguments.times_s.empty() && arguments.environments.size() == 1)) {
+    return fail(ErrorCode::kInvalid, std::to_string(arguments.environments.size()) +
+                                         " lights need --times with as many, not " +
+                                         std::to_string(arguments.times_s.size()));
+  }
+  LightFieldParts parts;
+  parts.times_s = arguments.times_s;
+  parts.loop = arguments.loop, parts.step = arguments.step, parts.period_s = arguments.period_s;
+  for (const std::string& path : arguments.environments) {
+    LightArguments one = arguments.light;
+    one.path = path;
+    RELIT_ASSIGN(LoadedLight light, load_light(one, arguments.order));
+    if (light.field && arguments.times_s.empty()) return std::move(*light.field);
+    if (light.field) {
+      return fail(ErrorCode::kUnsupported,
+                  path + ": varies already; only single lights can become keys");
+    }
+    parts.lights.push_back(std::move(light.light));
+  }
+  return LightField::create(std::move(parts));
+}
+
 int run(const Arguments& arguments) {
-  auto light = load_light(arguments.light, arguments.order);
-  if (!light) return report(light.error());
-  if (const Status status = write_light_json(arguments.output, light->light); !status)
+  const auto field = make_field(arguments);
+  if (!field) return report(field.error());
+  if (const Status status = write_light_json(arguments.output, *field); !status)
     return report(status.error());
-  const auto& mean = light->light.sh.front();
+  const decoders::Light light = field->mean();
+  const auto& mean = light.sh.front();
   std::fprintf(stderr, "%s: order %d, mean radiance %.4g %.4g %.4g\n", arguments.output.c_str(),
-               light->light.order(), mean[0] * decoders::kBand0, mean[1] * decoders::kBand0,
+               light.order(), mean[0] * decoders::kBand0, mean[1] * decoders::kBand0,
                mean[2] * decoders::kBand0);
   return kSuccess;
 }
@@ -32,14 +62,27 @@ Command add_light(CLI::App& app) {
       app.add_subcommand("light", "project an environment map to spherical harmonics, for devices");
   const auto arguments = std::make_shared<Arguments>();
   command
-      ->add_option("environment", arguments->light.path, ".hdr or .exr (equirectangular), or .json")
+      ->add_option("environment", arguments->environments,
+                   ".hdr or .exr (equirectangular), or .json; several with --times")
       ->required();
   command->add_option("-o,--output", arguments->output, "the .json file")->required();
   command->add_option("--order", arguments->order, "0 to 3")
       ->check(CLI::Range(0, 3))
       ->capture_default_str();
   add_light_options(*command, arguments->light);
-  command->footer("Example:\n  relit light sky.hdr -o sky.json --rotate-light 90 --light-window");
+  auto* times =
+      command->add_option("--times", arguments->times_s, "T,T,…: seconds at which each light holds")
+          ->delimiter(',');
+  command->add_flag("--loop", arguments->loop, "from the last light to the first again")
+      ->needs(times);
+  command->add_option("--period", arguments->period_s, "seconds after which the first comes again")
+      ->needs(times);
+  command->add_flag("--step", arguments->step, "from light to light at once, without blending")
+      ->needs(times);
+  command->footer(
+      "Examples:\n"
+      "  relit light sky.hdr -o sky.json --rotate-light 90 --light-window\n"
+      "  relit light dawn.hdr noon.hdr dusk.hdr --times 0,4,8 -o day.json");
   return [arguments] { return run(*arguments); };
 }
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-#include <filesystem>
+#include <charconv>
+#include <cstdio>
 
 #include "player/command.hpp"
-#include "player/http_source.hpp"
 #include "player/window.hpp"
 
 namespace relit::player {
@@ -10,39 +10,112 @@ namespace {
 
 struct Arguments {
   SourceArguments source;
-  std::string clip, camera;
+  std::string clips, camera, quality = "auto", composite = "auto", memory_budget;
   std::vector<std::string> lights;
+  std::vector<float> at;
   LightArguments light;
   WindowOptions window;
-  int threads = 1;
+  bool loop = false, no_loop = false, no_interpolation = false;
 };
 
-Status play(const Arguments& arguments, ClipReader& clip) {
+Result<std::optional<double>> parse_quality(const std::string& text) {
+  if (text == "auto") return std::optional<double>();
+  double quality = 0;
+  const char* end = text.data() + text.size();
+  const auto [rest, error] = std::from_chars(text.data(), end, quality);
+  if (error == std::errc() && rest == end && quality >= 0 && quality <= 1)
+    return std::optional<double>(quality);
+  return fail(ErrorCode::kInvalid, "--quality " + text + ": it must be auto, or from 0 to 1");
+}
+
+Status read_player_options(const Arguments& arguments, WindowOptions& window) {
+  PlayerOptions& player = window.player;
+  RELIT_ASSIGN(player.path, parse_composite_path(arguments.composite));
+  RELIT_ASSIGN(player.governor.quality, parse_quality(arguments.quality));
+  if (!arguments.memory_budget.empty()) {
+    RELIT_ASSIGN(player.memory_budget_bytes, parse_bytes(arguments.memory_budget));
+  }
+  player.interpolate = !arguments.no_interpolation;
+  player.layers = window.view.layers;
+  player.drawing = DrawingScale{};
+  player.drawing->background_side = window.view.background == "light" ? 512 : 0;
+  if (arguments.loop) window.loop = LoopMode::kOn;
+  if (arguments.no_loop) window.loop = LoopMode::kOff;
+  return {};
+}
+
+Result<WindowOptions> window_options(const Arguments& arguments) {
   WindowOptions window = arguments.window;
+  window.source = arguments.source.name;
+  window.reading.http_headers = arguments.source.http_headers;
+  window.reading.warn = [](const std::string& sentence) {
+    std::fprintf(stderr, "relit: warning: %s\n", sentence.c_str());
+  };
+  for (std::size_t from = 0; from < arguments.clips.size();) {
+    const std::size_t comma = std::min(arguments.clips.find(',', from), arguments.clips.size());
+    window.clips.push_back(arguments.clips.substr(from, comma - from));
+    from = comma + 1;
+  }
   if (!arguments.camera.empty()) {
     RELIT_ASSIGN(window.view.camera, parse_camera(arguments.camera));
   }
-  window.title = std::filesystem::path(arguments.source.name).filename().string();
-  std::vector<LoadedLight> lights;
+  if (!arguments.at.empty()) window.position = {arguments.at[0], arguments.at[1], arguments.at[2]};
+  RELIT_TRY(read_player_options(arguments, window));
   for (const std::string& path : arguments.lights) {
     LightArguments one = arguments.light;
     one.path = path;
     RELIT_ASSIGN(LoadedLight light, load_light(one, 3));
-    lights.push_back(std::move(light));
+    window.lights.push_back(std::move(light));
   }
-  return play_in_window(clip, lights, window);
+  window.light.window = arguments.light.window;
+  return window;
 }
 
 int run(const Arguments& arguments) {
-  ClipOptions options;
-  options.clip = arguments.clip, options.layers = arguments.window.view.layers,
-  options.threads = arguments.threads;
-  // What comes over a network is shown as soon as it can be, a disk is waited for.
-  options.impatient = is_http_address(arguments.source.name);
-  auto clip = open_clip(arguments.source, options);
-  if (!clip) return report(clip.error());
-  if (const Status status = play(arguments, *clip); !status) return report(status.error());
-  return report_loss(clip->loss());
+  const auto window = window_options(arguments);
+  if (!window) return report(window.error());
+  const auto loss = play_in_window(*window);
+  if (!loss) return report(loss.error());
+  return report_loss(*loss);
+}
+
+void add_playback_options(CLI::App& command, Arguments& a) {
+  command.add_option("--clip", a.clips,
+                     "by name or number; several, with commas between, are a sequence");
+  command
+      .add_option("--cross-fade", a.window.cross_fade_s,
+                  "over which the clips of a sequence blend, and those that C takes, seconds")
+      ->check(CLI::Range(0.0, 3600.0));
+  command.add_option("--start", a.window.start_s, "begin at this time, seconds")
+      ->check(CLI::Range(0.0, 1e9));
+  command.add_option("--speed", a.window.speed, "1 is real time")
+      ->check(CLI::Range(0.01, Playback::kLargestSpeed))
+      ->capture_default_str();
+  CLI::Option* loop = command.add_flag("--loop", a.loop,
+                                       "begin again at the end; by default the "
+                                       "clip says whether");
+  command.add_flag("--no-loop", a.no_loop, "stand at the end")->excludes(loop);
+  command.add_flag("--no-interpolation", a.no_interpolation,
+                   "show frames as they are, and nothing in between");
+}
+
+void add_cost_options(CLI::App& command, Arguments& a) {
+  command
+      .add_option("--target-fps", a.window.player.governor.target_fps,
+                  "pictures a second that the quality is chosen for")
+      ->check(CLI::Range(1.0, 1000.0))
+      ->capture_default_str();
+  command.add_option("--quality", a.quality, "auto, or from 0 to 1")->capture_default_str();
+  command
+      .add_option("--composite", a.composite, "who adds the planes up: auto, cpu, texture or fused")
+      ->capture_default_str();
+  command.add_option("--layers", a.window.view.layers,
+                     "only the first so many layers: faster and less accurate");
+  command.add_option("--threads", a.window.player.threads, "that decode; 0: one a processor")
+      ->check(CLI::Range(0, 64))
+      ->capture_default_str();
+  command.add_option("--memory-budget", a.memory_budget,
+                     "bytes, or such as 32MiB: plans to fit, or refuses");
 }
 
 }  // namespace
@@ -56,22 +129,29 @@ Command add_play(CLI::App& app) {
                    ".hdr, .exr (equirectangular) or .json; several are taken in turn")
       ->required();
   add_light_options(*command, a->light);
+  command
+      ->add_option(
+          "--at", a->at,
+          "X,Y,Z: where the character stands in a light that varies with the place, metres")
+      ->delimiter(',')
+      ->expected(3);
   add_view_options(*command, a->window.view, a->camera);
-  command->add_option("--clip", a->clip, "by name or number");
-  command->add_option("--layers", a->window.view.layers,
-                      "only the first so many layers: faster and less accurate");
-  command->add_option("--threads", a->threads, "of each decoder")
-      ->check(CLI::Range(1, 64))
-      ->capture_default_str();
+  add_playback_options(*command, *a);
+  add_cost_options(*command, *a);
   command->add_option("--width", a->window.width, "of the window")
       ->check(CLI::Range(16, 16384))
       ->capture_default_str();
   command->add_option("--height", a->window.height, "of the window")
       ->check(CLI::Range(16, 16384))
       ->capture_default_str();
+  command->add_flag("--fullscreen", a->window.fullscreen, "begin in full screen");
+  command
+      ->add_option("--ui-scale", a->window.ui_scale,
+                   "pixels a point of what is written over the picture; 0: by the display")
+      ->check(CLI::Range(0, 4));
   command->add_flag("--es2", a->window.es2, "take OpenGL ES 2");
   command->add_option("--pictures", a->window.max_shown, "leave after so many pictures");
-  command->footer(kWindowHelp);
+  command->footer(window_help());
   return [a] { return run(*a); };
 }
 

@@ -5,6 +5,7 @@
 #include "decoders/npy.hpp"
 #include "gles/picture.hpp"
 #include "player/command.hpp"
+#include "player/gl_backend.hpp"
 #include "player/picture_writer.hpp"
 #include "player/scene_view.hpp"
 
@@ -13,9 +14,11 @@ namespace {
 
 struct Arguments {
   SourceArguments source;
-  std::string output, clip, frame, frames, camera, sheet, backend = "egl", size = "512x512";
+  std::string output, clip, frame, frames, camera, sheet, backend = "egl", composite,
+                                                          size = "512x512";
   LightArguments light;
   ViewOptions view;
+  std::vector<float> position{0, 0, 0};
   double time_s = -1;
   int layers = -1, threads = 1, samples = 4;
   bool lightmap = false;
@@ -67,14 +70,46 @@ Result<FrameRange> chosen_frames(const Arguments& arguments, ClipReader& reader)
   return range;
 }
 
+// As asked for, by --composite or else by the backend.
+Result<CompositePath> chosen_path(const Arguments& arguments, Backend backend) {
+  if (!arguments.composite.empty()) return parse_composite_path(arguments.composite);
+  return backend == Backend::kCpu ? CompositePath::kCpu : CompositePath::kTexture;
+}
+
+// A light that varies, at the frames of a clip.
+class LightOfFrame {
+ public:
+  LightOfFrame(const Arguments& arguments, const LoadedLight& light, const ClipReader& clip)
+      : light_(light),
+        clip_(clip),
+        position_(arguments.position[0], arguments.position[1], arguments.position[2]) {}
+
+  // Of a frame that the clip has given; null where the light does not vary.
+  const decoders::Light* at(std::uint64_t frame) {
+    if (!light_.field) return nullptr;
+    const container::Rational& rate = clip_.clip().tick_rate;
+    const double time_s = static_cast<double>(clip_.first_tick(frame)) *
+                          static_cast<double>(rate.den) / static_cast<double>(rate.num);
+    light_.field->sample(time_s, position_, now_);
+    return &now_;
+  }
+
+ private:
+  const LoadedLight& light_;
+  const ClipReader& clip_;
+  glm::vec3 position_;
+  decoders::Light now_;
+};
+
 Status render_lightmap(const Arguments& arguments, ClipReader& clip, const LoadedLight& light,
                        Backend backend) {
   GlBackend gl;
-  if (backend != Backend::kCpu) {
+  RELIT_ASSIGN(const CompositePath path, chosen_path(arguments, backend));
+  if (path != CompositePath::kCpu) {
     RELIT_ASSIGN(gl, open_backend(backend));
   }
-  RELIT_ASSIGN(auto relighter, Relighter::create(clip.model(), clip.layers(), gl.device.get(),
-                                                 backend != Backend::kCpu));
+  RELIT_ASSIGN(auto relighter,
+               Relighter::create(clip.model(), clip.layers(), {gl.device.get(), path}));
   RELIT_TRY(relighter->set_light(light.light, decoded_layers(clip, arguments.layers)));
   RELIT_ASSIGN(const FrameRange range, chosen_frames(arguments, clip));
   std::vector<std::uint64_t> shape{3, clip.model().height, clip.model().width};
@@ -84,9 +119,12 @@ Status render_lightmap(const Arguments& arguments, ClipReader& clip, const Loade
       decoders::NpyWriter::create(arguments.output, decoders::NpyWriter::Type::kFloat32, shape));
   std::vector<float> map(std::size_t{3} * clip.model().height * clip.model().width);
   ClipFrame frame;
+  LightOfFrame varied(arguments, light, clip);
   for (std::uint64_t k = range.first; k <= range.last; ++k) {
     RELIT_TRY(clip.frame(k, frame));
-    RELIT_TRY(relighter->composite(frame.planes));
+    if (const decoders::Light* now = varied.at(k))
+      RELIT_TRY(relighter->set_light(*now, decoded_layers(clip, arguments.layers)));
+    RELIT_TRY(relighter->composite({&frame.planes}));
     RELIT_TRY(relighter->read(map));
     RELIT_TRY(writer.write(std::span<const float>(map)));
   }
@@ -103,7 +141,7 @@ class PictureRenderer {
     std::unique_ptr<PictureRenderer> self(new PictureRenderer);
     ViewOptions options = arguments.view;
     options.layers = arguments.layers;
-    options.composite_on_gpu = backend != Backend::kCpu;
+    RELIT_ASSIGN(options.composite, chosen_path(arguments, backend));
     if (!arguments.camera.empty()) {
       RELIT_ASSIGN(options.camera, parse_camera(arguments.camera));
     }
@@ -120,7 +158,9 @@ class PictureRenderer {
     return self;
   }
 
-  Status draw(const ClipFrame& frame, std::span<std::uint8_t> rgba) {
+  // `light` null: as it was.
+  Status draw(const ClipFrame& frame, const decoders::Light* light, std::span<std::uint8_t> rgba) {
+    if (light != nullptr) RELIT_TRY(scene_->vary_light(*light));
     RELIT_TRY(scene_->set_frame(frame));
     framebuffer_->bind();
     RELIT_TRY(scene_->draw(camera_, framebuffer_->draw_width(), framebuffer_->draw_height()));
@@ -139,7 +179,7 @@ class PictureRenderer {
 
 // Pictures side by side in one.
 Status render_sheet(const Arguments& arguments, ClipReader& clip, PictureRenderer& renderer,
-                    const FrameRange& range, Size size) {
+                    LightOfFrame& light, const FrameRange& range, Size size) {
   RELIT_ASSIGN(const Size cells, parse_size(arguments.sheet, "--sheet", 64));
   PictureWriter::Options options;
   options.path = arguments.output;
@@ -153,8 +193,9 @@ Status render_sheet(const Arguments& arguments, ClipReader& clip, PictureRendere
       static_cast<std::uint64_t>(cells.width) * static_cast<std::uint64_t>(cells.height);
   ClipFrame frame;
   for (std::uint64_t i = 0; i < count; ++i) {
-    RELIT_TRY(clip.frame(range.first + i * (range.last - range.first + 1) / count, frame));
-    RELIT_TRY(renderer.draw(frame, picture));
+    const std::uint64_t k = range.first + i * (range.last - range.first + 1) / count;
+    RELIT_TRY(clip.frame(k, frame));
+    RELIT_TRY(renderer.draw(frame, light.at(k), picture));
     const auto column = i % static_cast<std::uint64_t>(cells.width),
                row = i / static_cast<std::uint64_t>(cells.width);
     for (std::size_t y = 0; y < static_cast<std::size_t>(size.height); ++y) {
@@ -175,7 +216,9 @@ Status render_pictures(const Arguments& arguments, ClipReader& clip, const Loade
   RELIT_ASSIGN(const Size size, parse_size(arguments.size, "--size", 8192));
   RELIT_ASSIGN(const FrameRange range, chosen_frames(arguments, clip));
   RELIT_ASSIGN(auto renderer, PictureRenderer::create(arguments, clip, light, backend, size));
-  if (!arguments.sheet.empty()) return render_sheet(arguments, clip, *renderer, range, size);
+  LightOfFrame varied(arguments, light, clip);
+  if (!arguments.sheet.empty())
+    return render_sheet(arguments, clip, *renderer, varied, range, size);
   PictureWriter::Options options;
   options.path = arguments.output;
   options.width = size.width, options.height = size.height;
@@ -187,7 +230,7 @@ Status render_pictures(const Arguments& arguments, ClipReader& clip, const Loade
   ClipFrame frame;
   for (std::uint64_t k = range.first; k <= range.last; ++k) {
     RELIT_TRY(clip.frame(k, frame));
-    RELIT_TRY(renderer->draw(frame, picture));
+    RELIT_TRY(renderer->draw(frame, varied.at(k), picture));
     RELIT_TRY(writer->add(picture, clip.ticks_of(k)));
   }
   return writer->finish();
@@ -228,6 +271,11 @@ Command add_render(CLI::App& app) {
   command->add_option("--light", a->light.path, ".hdr, .exr (equirectangular) or .json")
       ->required();
   add_light_options(*command, a->light);
+  command
+      ->add_option("--at", a->position,
+                   "X,Y,Z: where the character stands among the probes of a light, metres")
+      ->delimiter(',')
+      ->expected(3);
   command->add_option("-o,--output", a->output, ".png, .mp4, .webp, .gif; with --lightmap .npy")
       ->required();
   auto* frame = command->add_option("--frame", a->frame, "one frame");
@@ -241,6 +289,9 @@ Command add_render(CLI::App& app) {
   add_view_options(*command, a->view, a->camera);
   command->add_option("--backend", a->backend, "egl, egl-es2, egl-es2-mediump, osmesa or cpu")
       ->capture_default_str();
+  command->add_option("--composite", a->composite,
+                      "where planes are added up: auto, cpu, texture or fused; by default what the "
+                      "backend says");
   command->add_option("--layers", a->layers,
                       "only the first so many layers: faster and less accurate");
   command->add_option("--threads", a->threads, "of each decoder")

@@ -17,7 +17,7 @@ namespace relit::player {
 namespace {
 
 constexpr std::uint64_t kPictureBytes = 512ull << 20;
-constexpr std::uint64_t kJsonBytes = 1ull << 20;
+constexpr std::uint64_t kJsonBytes = 4ull << 20;
 
 struct CloseFile {
   void operator()(std::FILE* file) const { std::fclose(file); }
@@ -84,7 +84,7 @@ Status check_options(const LightOptions& options) {
   return {};
 }
 
-/// Reads whichever format it is and sets light and environment.
+/// Reads whichever format it is and sets light, field and environment.
 Status read_light(const std::string& path, const LightOptions& options, LoadedLight& loaded) {
   RELIT_ASSIGN(const std::vector<std::uint8_t> bytes, read_file(path));
   if (bytes.empty()) return fail(ErrorCode::kTruncated, "the file is empty");
@@ -94,11 +94,15 @@ Status read_light(const std::string& path, const LightOptions& options, LoadedLi
                   "neither a Radiance .hdr nor an OpenEXR .exr nor a .json light");
     case Format::kJson: {
       if (bytes.size() > kJsonBytes) {
-        return fail(ErrorCode::kLimit, "a .json light is larger than 1 MiB");
+        return fail(ErrorCode::kLimit, "a .json light is larger than 4 MiB");
       }
-      RELIT_ASSIGN(loaded.light, read_light_json(bytes));
-      const auto rows = static_cast<std::size_t>(decoders::coefficient_count(options.order));
-      if (loaded.light.sh.size() > rows) loaded.light.sh.resize(rows);
+      RELIT_ASSIGN(LightField field, read_light_field(bytes));
+      field.transform(options.order, options.rotate_rad, options.window);
+      loaded.light = field.parts().lights[0];
+      if (field.varies_in_time() || field.varies_in_space()) {
+        loaded.light = field.mean();
+        loaded.field = std::move(field);
+      }
       return {};
     }
     case Format::kHdr: {
@@ -117,6 +121,9 @@ Status read_light(const std::string& path, const LightOptions& options, LoadedLi
                               std::to_string(environment.height) +
                               ", not twice as wide as high; it is stretched over the whole sphere");
   }
+  loaded.environment_rotation_rad = options.rotate_rad;
+  decoders::rotate_light_y(loaded.light, options.rotate_rad);
+  if (options.window) decoders::window_light(loaded.light);
   return {};
 }
 
@@ -147,20 +154,29 @@ Result<LoadedLight> load_light(const std::string& path, const LightOptions& opti
   }
   if (!status) return fail(status.error().code, path + ": " + status.error().message);
   for (std::string& warning : loaded.warnings) warning = path + ": " + warning;
-  decoders::rotate_light_y(loaded.light, options.rotate_rad);
-  if (loaded.environment) loaded.environment_rotation_rad = options.rotate_rad;
-  if (options.window) decoders::window_light(loaded.light);
   loaded.minimum_radiance = decoders::minimum_radiance(loaded.light);
   return loaded;
 }
 
-Status write_light_json(const std::string& path, const decoders::Light& light) {
-  RELIT_ASSIGN(const std::string text, light_json(light));
+namespace {
+
+Status write_text(const std::string& path, const std::string& text) {
   File file(std::fopen(path.c_str(), "wb"));
   const bool written = file && std::fwrite(text.data(), 1, text.size(), file.get()) == text.size();
   const bool closed = file && std::fclose(file.release()) == 0;  // a full disk may show only here
   if (written && closed) return {};
   return fail(ErrorCode::kIo, path + ": cannot be written: " + std::strerror(errno));
+}
+
+}  // namespace
+
+Status write_light_json(const std::string& path, const decoders::Light& light) {
+  RELIT_ASSIGN(const std::string text, light_json(light));
+  return write_text(path, text);
+}
+
+Status write_light_json(const std::string& path, const LightField& field) {
+  return write_text(path, light_field_json(field));
 }
 
 }  // namespace relit::player

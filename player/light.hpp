@@ -8,6 +8,7 @@
 
 #include "container/base/result.hpp"
 #include "decoders/sh.hpp"
+#include "player/light_field.hpp"
 
 /// Lights from files: what `--light L` names.
 namespace relit::player {
@@ -19,7 +20,8 @@ struct LightOptions {
 };
 
 struct LoadedLight {
-  decoders::Light light;  ///< turned and windowed as asked
+  decoders::Light light;  ///< turned and windowed as asked; of a field its mean, for the exposure
+  std::optional<LightField> field;  ///< of a light that varies; turned and windowed likewise
   /// The picture as the file has it, for drawing the background; a direction's φ is
   /// φ(picture) + environment_rotation_rad. None for a .json.
   std::optional<decoders::Environment> environment;
@@ -32,8 +34,9 @@ struct LoadedLight {
 };
 
 /// Loads a light: an equirectangular picture, Radiance .hdr or OpenEXR .exr, or a .json
-/// `{"sh": [[r,g,b], …]}` with 1, 4, 9 or 16 rows. The content decides which it is, and the suffix
-/// where the content does not.
+/// `{"sh": [[r,g,b], …]}` with 1, 4, 9 or 16 rows, or one that varies with time and place
+/// (PLAYBACK.md has its forms). The content decides which it is, and the suffix where the content
+/// does not.
 ///
 /// A picture that is not twice as wide as it is high is stretched over the whole sphere, with a
 /// warning. Of an .exr, channels R, G, B or only Y of half or float are read, alpha is ignored, and
@@ -43,9 +46,9 @@ struct LoadedLight {
 /// applied.
 ///
 /// Errors, all with the path and the place: kIo, kTruncated, kCorrupt, kUnsupported, kLimit (files
-/// beyond 512 MiB, 1 MiB for .json; pictures beyond limits::kImageSide or kImageTexels), kInvalid
-/// (radiance that is negative or not finite, rows that are not three finite numbers, options),
-/// kOutOfMemory. Any thread.
+/// beyond 512 MiB, 4 MiB for .json; pictures beyond limits::kImageSide or kImageTexels; fields
+/// beyond LightField's limits), kInvalid (radiance that is negative or not finite, rows that are
+/// not three finite numbers, options), kOutOfMemory. Any thread.
 Result<LoadedLight> load_light(const std::string& path, const LightOptions& options = {});
 
 /// The light as the .json that load_light reads: the same bytes for the same light, and the same
@@ -53,7 +56,8 @@ Result<LoadedLight> load_light(const std::string& path, const LightOptions& opti
 /// 16 rows.
 Result<std::string> light_json(const decoders::Light& light);
 
-/// Writes light_json() to `path`. Errors: also kIo.
+/// Writes light_json() or light_field_json() to `path`. Errors: also kIo.
 Status write_light_json(const std::string& path, const decoders::Light& light);
+Status write_light_json(const std::string& path, const LightField& field);
 
 }  // namespace relit::player

@@ -1,21 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include "player/relighter.hpp"
 
-#include <array>
+#include <algorithm>
 #include <bit>
+#include <chrono>
+#include <cmath>
 
 namespace relit::player {
 namespace {
-
-struct BackendName {
-  Backend backend;
-  const char* name;
-};
-constexpr std::array<BackendName, 5> kBackends{{{Backend::kEgl, "egl"},
-                                                {Backend::kEglEs2, "egl-es2"},
-                                                {Backend::kEglEs2Mediump, "egl-es2-mediump"},
-                                                {Backend::kOsmesa, "osmesa"},
-                                                {Backend::kCpu, "cpu"}}};
 
 gles::PlaneDescription describe(const container::LayerRecord& layer,
                                 const container::PlaneRecord& plane, int layer_number) {
@@ -24,6 +16,8 @@ gles::PlaneDescription describe(const container::LayerRecord& layer,
   out.mantissa_shift = layer.chroma == container::Chroma::k420 && plane.component > 0 ? 1 : 0;
   out.mantissa = {3 * layer_number + plane.component, plane.mantissa_rect.x >> out.mantissa_shift,
                   plane.mantissa_rect.y >> out.mantissa_shift};
+  out.channels = 0;
+  for (const container::MatrixEntry& entry : plane.matrix) out.channels |= 1u << entry.channel;
   out.has_exponent = layer.has_exponents;
   if (layer.has_exponents) {
     out.exponent_shift = std::countr_zero(static_cast<unsigned>(layer.exponent_block));
@@ -32,82 +26,95 @@ gles::PlaneDescription describe(const container::LayerRecord& layer,
   return out;
 }
 
-Result<GlBackend> open_kind(gles::OffscreenKind kind, std::optional<gles::Profile> profile) {
-  GlBackend backend;
-  RELIT_ASSIGN(backend.context, gles::OffscreenContext::create(kind));
-  gles::DeviceOptions options;
-  options.get_proc_address = backend.context->get_proc_address();
-  options.profile = profile;
-  RELIT_ASSIGN(backend.device, gles::Device::create(options));
-  return backend;
-}
-
 }  // namespace
 
-Result<Backend> parse_backend(const std::string& name) {
-  for (const BackendName& known : kBackends) {
-    if (name == known.name) return known.backend;
+gles::PlaneSetDescription describe_planes(const container::ModelRecord& model,
+                                          std::span<const container::LayerRecord> layers) {
+  gles::PlaneSetDescription description;
+  description.width = model.width, description.height = model.height;
+  for (std::size_t l = 0; l < layers.size(); ++l) {
+    for (const container::PlaneRecord& plane : layers[l].planes) {
+      description.planes.push_back(describe(layers[l], plane, static_cast<int>(l)));
+    }
   }
-  return fail(ErrorCode::kInvalid,
-              "--backend " + name + ": it must be egl, egl-es2, egl-es2-mediump, osmesa or cpu");
-}
-
-const char* backend_name(Backend backend) {
-  for (const BackendName& known : kBackends) {
-    if (backend == known.backend) return known.name;
-  }
-  return "?";
-}
-
-Result<GlBackend> open_backend(Backend backend) {
-  switch (backend) {
-    case Backend::kEgl:
-      return open_kind(gles::OffscreenKind::kEglEs3, gles::Profile::kEs3);
-    case Backend::kEglEs2:
-      return open_kind(gles::OffscreenKind::kEglEs2, gles::Profile::kEs2);
-    case Backend::kEglEs2Mediump:
-      return open_kind(gles::OffscreenKind::kEglEs2, gles::Profile::kEs2Mediump);
-    case Backend::kOsmesa:
-      return open_kind(gles::OffscreenKind::kOsmesa, std::nullopt);
-    case Backend::kCpu:
-      break;
-  }
-  auto egl = open_kind(gles::OffscreenKind::kEglEs3, std::nullopt);
-  if (egl) return egl;
-  auto es2 = open_kind(gles::OffscreenKind::kEglEs2, gles::Profile::kEs2);
-  if (es2) return es2;
-  auto osmesa = open_kind(gles::OffscreenKind::kOsmesa, std::nullopt);
-  if (osmesa) return osmesa;
-  return fail(ErrorCode::kEnvironment, egl.error().message + "; " + osmesa.error().message);
+  return description;
 }
 
 Result<std::unique_ptr<Relighter>> Relighter::create(const container::ModelRecord& model,
                                                      std::span<const container::LayerRecord> layers,
-                                                     const gles::Device* device, bool on_gpu) {
+                                                     const RelightOptions& options) {
   std::unique_ptr<Relighter> relighter(new Relighter);
   relighter->model_ = &model;
   relighter->layers_ = layers;
-  if (device != nullptr && on_gpu) {
-    gles::PlaneSetDescription description;
-    description.width = model.width, description.height = model.height;
-    for (std::size_t l = 0; l < layers.size(); ++l) {
-      for (const container::PlaneRecord& plane : layers[l].planes) {
-        description.planes.push_back(describe(layers[l], plane, static_cast<int>(l)));
-      }
-    }
-    RELIT_ASSIGN(relighter->compositor_, gles::Compositor::create(*device, description));
-    return relighter;
-  }
-  relighter->composite_.resize(std::size_t{3} * model.width * model.height);
-  if (device != nullptr) {
-    RELIT_ASSIGN(auto uploader, gles::LightMapUploader::create(*device, model.width, model.height));
-    relighter->uploader_ = std::make_unique<gles::LightMapUploader>(std::move(uploader));
-  }
+  relighter->options_ = options;
+  relighter->needs_ = PlaneNeeds(layers);
+  RELIT_TRY(relighter->set_path(options.path));
   return relighter;
 }
 
+Status Relighter::set_path(CompositePath path) {
+  if (path != CompositePath::kAuto) {
+    RELIT_TRY(prepare(path));
+    path_ = path;
+    options_.path = path;
+    return {};
+  }
+  std::array<bool, kCompositePaths> available{};
+  if (options_.device != nullptr && model_->prediction_plane < 0) {
+    const bool on_gpu = prepare(CompositePath::kTexture).has_value();
+    available[static_cast<std::size_t>(CompositePath::kTexture)] = on_gpu;
+    available[static_cast<std::size_t>(CompositePath::kFused)] =
+        on_gpu && prepare(CompositePath::kFused).has_value();
+  }
+  PathChooser chooser(available);
+  RELIT_TRY(prepare(chooser.path()));
+  chooser_ = chooser;
+  path_ = chooser_.path();
+  options_.path = path;
+  return {};
+}
+
+Status Relighter::prepare(CompositePath path) {
+  if (path == CompositePath::kCpu) return prepare_cpu();
+  if (options_.device == nullptr)
+    return fail(ErrorCode::kInvalid,
+                std::string("the path \"") + composite_path_name(path) + "\" needs a GL device");
+  RELIT_TRY(prepare_gpu());
+  return path == CompositePath::kFused ? compositor_->prepare_fused() : Status();
+}
+
+Status Relighter::prepare_cpu() {
+  if (composite_.empty()) composite_.resize(std::size_t{3} * model_->width * model_->height);
+  job_planes_.reserve(2 * needs_.planes().size());
+  job_weights_.reserve(2 * needs_.planes().size());
+  return options_.device != nullptr ? prepare_uploader(0) : Status();
+}
+
+Status Relighter::prepare_uploader(std::size_t half) {
+  std::unique_ptr<gles::LightMapUploader>& uploader = uploaders_[half];
+  if (uploader) return {};
+  const auto side = [&](int full) { return half != 0 ? gles::half_side(full) : full; };
+  RELIT_ASSIGN(auto made, gles::LightMapUploader::create(*options_.device, side(model_->width),
+                                                         side(model_->height), options_.format));
+  uploader = std::make_unique<gles::LightMapUploader>(std::move(made));
+  return {};
+}
+
+Status Relighter::prepare_gpu() {
+  if (compositor_) return {};
+  gles::PlaneSetDescription description = describe_planes(*model_, layers_);
+  description.format = options_.format;
+  RELIT_ASSIGN(compositor_, gles::Compositor::create(*options_.device, description));
+  for (FrameKey& slot : slots_) slot = {};
+  return {};
+}
+
 Status Relighter::set_light(const decoders::Light& light, std::span<const std::uint8_t> decoded) {
-  RELIT_TRY(decoders::fold_light(*model_, layers_, light, folded_));
+  const Status folded = decoders::fold_light(*model_, layers_, light, folded_);
+  if (!folded) {
+    folded_.weights.assign(needs_.planes().size(), Rgb{});
+    folded_.view = {};
+  }
   std::size_t plane = 0;
   for (std::size_t l = 0; l < layers_.size(); ++l) {
     const bool missing = l < decoded.size() && decoded[l] == 0;
@@ -116,43 +123,122 @@ Status Relighter::set_light(const decoders::Light& light, std::span<const std::u
     }
   }
   folded_.view.weights = folded_.weights;
-  return {};
+  has_light_ = true;
+  change_light();
+  return folded;
 }
 
-Status Relighter::composite(const decoders::FrameView& frame) {
-  if (compositor_) {
-    RELIT_TRY(compositor_->upload(frame.planes()));
-    RELIT_ASSIGN(light_map_, compositor_->composite(folded_.view));
-    return {};
+void Relighter::set_quality(const RelightQuality& quality) {
+  if (quality == quality_) return;
+  quality_ = quality;
+  change_light();
+}
+
+void Relighter::set_exposure(float exposure) {
+  if (exposure == exposure_) return;
+  exposure_ = exposure;
+  change_light();
+}
+
+// The weights of the moment. Only where they differ from those before is there anything to do.
+void Relighter::change_light() {
+  if (!has_light_) return;
+  needs_.update(folded_.view, quality_, exposure_);
+  FoldedLight light = folded_.view;
+  bool same = quality_.half_size == half_size_ && weights_.size() == light.weights.size() &&
+              light.constant == light_.constant && light.magnitude == light_.magnitude &&
+              light.irradiance == light_.irradiance;
+  weights_.resize(light.weights.size());
+  for (std::size_t k = 0; k < weights_.size(); ++k) {
+    const Rgb weight = needs_.planes()[k] != 0 ? light.weights[k] : Rgb{};
+    same = same && weight == weights_[k];
+    weights_[k] = weight;
   }
-  decoders::CompositeJob job;
-  job.planes = frame.planes();
-  job.light = folded_.view;
-  job.width = model_->width, job.height = model_->height;
-  job.out = composite_;
-  RELIT_TRY(job.validate());
-  job.run();
-  if (!uploader_) return {};
-  RELIT_ASSIGN(light_map_, uploader_->upload(composite_, folded_.view.magnitude));
-  return {};
+  light.weights = weights_;
+  light_ = light;
+  half_size_ = quality_.half_size;
+  if (!same) ++light_serial_;
 }
 
-Result<gles::LightMap> Relighter::texture() {
-  if (light_map_.texture == 0)
-    return fail(ErrorCode::kInvalid, "no light map has been composited on a GL device");
-  return light_map_;
+void Relighter::forget() {
+  done_.valid = false;
+  for (FrameKey& slot : slots_) slot.valid = false;
 }
 
-Status Relighter::read(std::span<float> out) {
-  if (compositor_) {
-    RELIT_TRY(compositor_->read_back(out));
-  } else if (out.size() == composite_.size()) {
-    std::copy(composite_.begin(), composite_.end(), out.begin());
-  } else {
-    return fail(ErrorCode::kInvalid, "light map: a span of the wrong size");
+int Relighter::width() const {
+  return half_size_ ? gles::half_side(model_->width) : static_cast<int>(model_->width);
+}
+int Relighter::height() const {
+  return half_size_ ? gles::half_side(model_->height) : static_cast<int>(model_->height);
+}
+
+std::string Relighter::why() const {
+  if (options_.path == CompositePath::kAuto) return chooser_.why();
+  return std::string(composite_path_name(path_)) + ": asked for";
+}
+
+Status Relighter::draw(gles::CharacterRenderer& renderer, const gles::View& view) {
+  if (!faded_ && done_.valid && path_ == CompositePath::kFused) return renderer.draw(view, *fused_);
+  RELIT_ASSIGN(const gles::LightMap map, texture());
+  return renderer.draw(view, map);
+}
+
+bool Relighter::wants_measuring(double covered_pixels) {
+  return options_.path == CompositePath::kAuto && chooser_.wants_measuring(covered_pixels);
+}
+
+Status Relighter::measure(const FrameMix& mix, gles::CharacterRenderer& renderer,
+                          const gles::View& view) {
+  const CompositePath before = path_;
+  std::array<double, kCompositePaths> cost_s{};
+  for (const CompositePath path :
+       {CompositePath::kCpu, CompositePath::kTexture, CompositePath::kFused}) {
+    if (!chooser_.available(path)) continue;
+    const Result<double> cost = time_path(path, mix, renderer, view);
+    if (cost) cost_s[static_cast<std::size_t>(path)] = *cost;
+    if (!cost && path == before) return Unexpected{cost.error()};
   }
-  for (float& value : out) value *= folded_.view.magnitude;
-  return {};
+  chooser_.take(cost_s);
+  path_ = chooser_.path();
+  forget();
+  return composite(mix);
+}
+
+// The least of three, after one that compiles and allocates: what disturbs a measurement adds to
+// it.
+Result<double> Relighter::time_path(CompositePath path, const FrameMix& mix,
+                                    gles::CharacterRenderer& renderer, const gles::View& view) {
+  using Clock = std::chrono::steady_clock;
+  constexpr int kRounds = 4;
+  RELIT_TRY(prepare(path));
+  path_ = path;
+  double least_s = 0;
+  for (int round = 0; round < kRounds; ++round) {
+    forget();
+    options_.device->gl().Finish();
+    const Clock::time_point start = Clock::now();
+    RELIT_TRY(composite(mix));
+    RELIT_TRY(draw(renderer, view));
+    options_.device->gl().Finish();
+    const double cost_s = std::chrono::duration<double>(Clock::now() - start).count();
+    if (round == 1 || (round > 1 && cost_s < least_s)) least_s = cost_s;
+  }
+  return least_s;
+}
+
+std::size_t Relighter::gpu_bytes() const {
+  std::size_t bytes = compositor_ ? compositor_->gpu_bytes() : 0;
+  for (const auto& uploader : uploaders_)
+    if (uploader) bytes += uploader->gpu_bytes();
+  return bytes + (mixer_ ? mixer_->gpu_bytes() : 0);
+}
+
+std::size_t Relighter::cpu_bytes() const {
+  std::size_t bytes = sizeof(float) * (composite_.size() + faded_on_cpu_.size());
+  if (compositor_) bytes += compositor_->cpu_bytes();
+  for (const auto& uploader : uploaders_)
+    if (uploader) bytes += uploader->cpu_bytes();
+  return bytes;
 }
 
 }  // namespace relit::player

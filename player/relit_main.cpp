@@ -21,11 +21,13 @@ int main(int argc, char** argv) {
     const char* name;
     Command run;
   };
-  const std::array<Entry, 11> commands{{{"info", add_info(app)},
+  const std::array<Entry, 13> commands{{{"info", add_info(app)},
+                                        {"plan", add_plan(app)},
                                         {"dump", add_dump(app)},
                                         {"light", add_light(app)},
                                         {"render", add_render(app)},
                                         {"play", add_play(app)},
+                                        {"stream", add_stream(app)},
                                         {"validate", add_validate(app)},
                                         {"recover", add_recover(app)},
                                         {"remux", add_remux(app)},

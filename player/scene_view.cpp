@@ -37,6 +37,23 @@ Result<gles::ToneMap> parse_tone_map(const std::string& text) {
   return fail(ErrorCode::kInvalid, "--tone-map " + text + ": it must be neutral, filmic or linear");
 }
 
+// The area that the box from `low` to `high` takes in the picture, as a rectangle.
+double covered_pixels(const gles::View& view, const std::array<float, 3>& low,
+                      const std::array<float, 3>& high) {
+  glm::vec2 least(1e9f), most(-1e9f);
+  for (unsigned corner = 0; corner < 8; ++corner) {
+    const glm::vec4 at((corner & 1u) != 0 ? high[0] : low[0], (corner & 2u) != 0 ? high[1] : low[1],
+                       (corner & 4u) != 0 ? high[2] : low[2], 1);
+    const glm::vec4 clip = view.projection * view.view * at;
+    if (!(clip.w > 0)) return static_cast<double>(view.width) * view.height;
+    least = glm::min(least, glm::vec2(clip) / clip.w);
+    most = glm::max(most, glm::vec2(clip) / clip.w);
+  }
+  const glm::vec2 seen = glm::clamp(most, -1.0f, 1.0f) - glm::clamp(least, -1.0f, 1.0f);
+  return 0.25 * static_cast<double>(seen.x) * static_cast<double>(seen.y) * view.width *
+         view.height;
+}
+
 bool is_color(const std::string& text) {
   return text.size() == 7 && text[0] == '#' &&
          text.find_first_not_of("0123456789abcdefABCDEF", 1) == std::string::npos;
@@ -65,9 +82,14 @@ Result<std::unique_ptr<SceneView>> SceneView::create(const ClipReader& clip,
   }
   RELIT_ASSIGN(scene->view_.tone_map, parse_tone_map(options.tone_map));
   RELIT_ASSIGN(scene->relighter_,
-               Relighter::create(clip.model(), clip.layers(), &device, options.composite_on_gpu));
-  RELIT_ASSIGN(scene->character_, Character::create(clip, device));
+               Relighter::create(clip.model(), clip.layers(), {&device, options.composite}));
+  RELIT_ASSIGN(scene->character_, Character::create(clip.contents(), clip.meshes(), device));
   return scene;
+}
+
+void SceneView::scale_exposure(float factor) {
+  view_.exposure *= factor;
+  relighter_->set_exposure(view_.exposure);
 }
 
 Status SceneView::fold(const decoders::Light& light) {
@@ -76,6 +98,7 @@ Status SceneView::fold(const decoders::Light& light) {
 
 Status SceneView::set_light(const LoadedLight& light) {
   RELIT_ASSIGN(view_.exposure, choose_exposure(options_.exposure, light.light));
+  relighter_->set_exposure(view_.exposure);
   RELIT_TRY(fold(light.light));
   return set_background(light);
 }
@@ -87,6 +110,14 @@ Status SceneView::turn_light(const LoadedLight& light, double turn_rad) {
   character_->renderer().background().set_rotation(
       static_cast<float>(light.environment_rotation_rad + turn_rad));
   return {};
+}
+
+Status SceneView::vary_light(const decoders::Light& light) {
+  RELIT_TRY(fold(light));
+  if (options_.background != "light" && options_.background != "sh") return {};
+  LoadedLight seen;
+  seen.light = light;
+  return set_background(seen);
 }
 
 Status SceneView::set_background(const LoadedLight& light) {
@@ -120,12 +151,12 @@ Status SceneView::set_background(const LoadedLight& light) {
 }
 
 Status SceneView::set_frame(const ClipFrame& frame) {
-  RELIT_TRY(relighter_->composite(frame.planes));
+  frame_ = &frame;
+  RELIT_TRY(relighter_->composite({&frame.planes}));
   return character_->pose(frame.pose);
 }
 
 Status SceneView::draw(const OrbitCamera& camera, int width, int height) {
-  RELIT_ASSIGN(const gles::LightMap light_map, relighter_->texture());
   const auto& low = clip_.clip().bounds_min;
   const auto& high = clip_.clip().bounds_max;
   const double aspect = static_cast<double>(width) / height;
@@ -133,7 +164,11 @@ Status SceneView::draw(const OrbitCamera& camera, int width, int height) {
       camera_matrices(camera, {low[0], low[1], low[2]}, {high[0], high[1], high[2]}, aspect);
   view_.view = matrices.view, view_.projection = matrices.projection;
   view_.width = width, view_.height = height;
-  return character_->renderer().draw(view_, light_map);
+  gles::CharacterRenderer& renderer = character_->renderer();
+  const double covered = covered_pixels(view_, low, high);
+  if (frame_ != nullptr && relighter_->wants_measuring(covered))
+    RELIT_TRY(relighter_->measure({&frame_->planes}, renderer, view_));
+  return relighter_->draw(renderer, view_);
 }
 
 }  // namespace relit::player

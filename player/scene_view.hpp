@@ -22,7 +22,7 @@ struct ViewOptions {
   std::string background = "light";  ///< light, sh, none or #rrggbb
   double background_blur_deg = 0;
   int layers = -1;  ///< decoded layers, from the most important on; -1: all
-  bool composite_on_gpu = true;
+  CompositePath composite = CompositePath::kTexture;
 };
 
 /// A clip in a GL context, under a light, from a camera: what `relit render` and `relit play`
@@ -39,12 +39,18 @@ class SceneView {
   /// Takes only a turned light: `light` and its background are `turn_rad` further about +Y than
   /// set_light()'s.
   Status turn_light(const LoadedLight& light, double turn_rad);
-  /// Composites and poses a frame. Call it again after a change of light.
+  /// Takes what the light that set_light() took has become at a time and place; it has no picture.
+  /// The exposure stays.
+  Status vary_light(const decoders::Light& light);
+  /// Composites and poses a frame, which stays until the next one. Call it again after a change of
+  /// light.
   Status set_frame(const ClipFrame& frame);
   /// Draws into the framebuffer that is bound, over all of its width × height pixels.
   Status draw(const OrbitCamera& camera, int width, int height);
   /// Multiplies the exposure.
-  void scale_exposure(float factor) { view_.exposure *= factor; }
+  void scale_exposure(float factor);
+
+  [[nodiscard]] const Relighter& relighter() const { return *relighter_; }
 
   [[nodiscard]] const std::vector<std::string>& warnings() const { return character_->warnings(); }
 
@@ -56,6 +62,7 @@ class SceneView {
 
   const ClipReader& clip_;
   ViewOptions options_;
+  const ClipFrame* frame_ = nullptr;  // of the last set_frame()
   std::unique_ptr<Relighter> relighter_;
   std::unique_ptr<Character> character_;
   gles::View view_;

@@ -66,7 +66,7 @@ void TrackChecker::open_video(const FindingPlace& place, const LayerRecord& laye
   if (!fresh) return;
   at->second.layer = &layer;
   at->second.exponents = exponents;
-  auto decoder = TrackDecoder::open(format, threads_);
+  auto decoder = TrackDecoder::open(format, {threads_, {}, nullptr});
   if (decoder)
     at->second.decoder.emplace(std::move(*decoder));
   else if (decoder.error().code == ErrorCode::kUnsupported)

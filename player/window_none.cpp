@@ -4,9 +4,9 @@
 
 namespace relit::player {
 
-const char* const kWindowHelp = "This relit was built without a window.";
+std::string window_help() { return "This relit was built without a window."; }
 
-Status play_in_window(ClipReader&, std::span<const LoadedLight>, const WindowOptions&) {
+Result<PlaybackLoss> play_in_window(const WindowOptions&) {
   return fail(ErrorCode::kEnvironment,
               "play: this relit was built without a window (RELIT_WINDOW=OFF); `relit render` "
               "writes pictures and films");

@@ -5,24 +5,33 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <filesystem>
 
-#include "gles/picture.hpp"
-#include "player/picture_writer.hpp"
+#include "gles/overlay.hpp"
 #include "player/window.hpp"
+#include "player/window_input.hpp"
+#include "player/window_screenshot.hpp"
+#include "player/window_sdl_events.hpp"
+#include "player/window_session.hpp"
 
 namespace relit::player {
 
-const char* const kWindowHelp = R"(In the window:
-  drag                 turn the camera          wheel        nearer, farther
-  shift+drag or right  turn the light           L            the next light
-  space                pause                    left, right  one frame back, on
-  + -                  exposure                 F            full screen
-  S                    a screenshot             Escape, Q    leave)";
+std::string window_help() {
+  std::string text = "In the window:";
+  for (const KeyHelp& entry : key_help()) {
+    if (entry.keys == nullptr) {
+      text += std::string("\n ") + entry.what + ":";
+      continue;
+    }
+    // Arrows are three bytes and one column.
+    std::size_t columns = 0;
+    for (const char* c = entry.keys; *c != 0; ++c) columns += (*c & 0xC0) != 0x80 ? 1 : 0;
+    text += std::string("\n  ") + entry.keys + std::string(columns < 22 ? 22 - columns : 1, ' ') +
+            entry.what;
+  }
+  return text + "\nDrop a .relit on the window to play it, an .hdr, .exr or .json to light it.";
+}
 
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 struct SdlQuit {
   ~SdlQuit() { SDL_Quit(); }
@@ -42,64 +51,51 @@ Unexpected no_window(const char* what) {
                   "; `relit render` writes pictures and films without a display");
 }
 
+double now_s() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
 class Window {
  public:
-  Window(ClipReader& clip, std::span<const LoadedLight> lights, const WindowOptions& options)
-      : clip_(clip), lights_(lights), options_(options), camera_(options.view.camera) {}
-
-  Status run() {
-    RELIT_TRY(open());
-    last_tick_ = Clock::now();
-    while (!leave_) {
-      SDL_Event event;
-      while (SDL_PollEvent(&event) != 0) handle(event);
-      advance_clock();
-      RELIT_TRY(show());
-      if (options_.max_shown != 0 && shown_ >= options_.max_shown) break;
-    }
-    return {};
-  }
+  explicit Window(const WindowOptions& options) : options_(options) {}
+  Status open();
+  Status run();
+  [[nodiscard]] PlaybackLoss loss() const { return session_->loss(); }
 
  private:
-  Status open();
   Status open_context(bool es3);
   void handle(const SDL_Event& event);
-  void handle_key(SDL_Keycode key);
-  void handle_motion(const SDL_MouseMotionEvent& motion);
-  void advance_clock();
-  void step(int frames);
+  Status serve_requests();
   Status show();
-  Status update();
-  Status screenshot();
-  void update_title();
+  void draw_overlay_model(double now);
+  void set_fullscreen(bool fullscreen);
+  void update_pointer(double now);
+  void count_picture(double now);
+  [[nodiscard]] int ui_scale(int window_height, int drawable_height) const;
 
-  [[nodiscard]] double ticks_per_s() const {
-    return static_cast<double>(clip_.clip().tick_rate.num) /
-           static_cast<double>(clip_.clip().tick_rate.den);
-  }
-
-  ClipReader& clip_;
-  std::span<const LoadedLight> lights_;
   const WindowOptions& options_;
-  OrbitCamera camera_;
   // Destroyed from the last to the first: GL objects before the context, SDL at the very end.
   SdlQuit quit_;
   std::unique_ptr<SDL_Window, WindowDelete> window_;
   std::unique_ptr<void, ContextDelete> context_;
+  bool es3_ = true;
   std::unique_ptr<gles::Device> device_;
-  std::unique_ptr<SceneView> scene_;
-  ClipFrame frame_;
+  std::unique_ptr<gles::Overlay> overlay_;
+  std::unique_ptr<WindowSession> session_;
 
-  Clock::time_point last_tick_;
-  double position_ = 0;  // in ticks
-  std::uint64_t shown_frame_ = ~std::uint64_t{0};
-  std::size_t light_ = 0;
-  double light_turn_rad_ = 0;
+  SdlEvents events_;
+  PointerRest pointer_;
+  std::vector<Action> actions_;
+  gles::OverlayCanvas canvas_;
+  OverlayModel model_;
+  WindowStatistics statistics_;
+  int width_px_ = 0, height_px_ = 0;
+  float points_per_unit_ = 1;  // of the overlay, in a unit of SDL's window coordinates
+  bool fullscreen_ = false, pointer_shown_ = true, leave_ = false, exposed_ = true;
+  bool overlay_shown_ = false;
+  std::string shown_title_;
   std::uint64_t shown_ = 0, counted_ = 0;
-  Clock::time_point counted_since_ = Clock::now();
-  double shown_per_s_ = 0;
-  bool paused_ = false, leave_ = false, fullscreen_ = false;
-  bool light_changed_ = true, light_turned_ = false, redraw_ = true, want_screenshot_ = false;
+  double counted_since_s_ = now_s(), last_picture_s_ = 0;
 };
 
 Status Window::open_context(bool es3) {
@@ -123,14 +119,13 @@ Status Window::open_context(bool es3) {
     create();
   }
   if (!context_) return no_window(window_ ? "no OpenGL ES context" : "no window");
-  gles::DeviceOptions device;
-  device.get_proc_address = [](const char* name) { return SDL_GL_GetProcAddress(name); };
-  if (!es3) device.profile = gles::Profile::kEs2;
-  RELIT_ASSIGN(device_, gles::Device::create(device));
+  es3_ = es3;
   return {};
 }
 
 Status Window::open() {
+  // A window in full screen stays one among others.
+  SDL_SetHint(SDL_HINT_VIDEO_X11_NET_WM_BYPASS_COMPOSITOR, "0");
   if (SDL_Init(SDL_INIT_VIDEO) != 0) return no_window("no display");
   // SDL's dummy drivers show nothing to anybody.
   const char* driver = SDL_GetCurrentVideoDriver();
@@ -141,16 +136,35 @@ Status Window::open() {
   Status opened = options_.es2 ? open_context(false) : open_context(true);
   if (!opened && !options_.es2) opened = open_context(false);
   RELIT_TRY(opened);
-  SDL_GL_SetSwapInterval(1);
-  RELIT_ASSIGN(scene_, SceneView::create(clip_, *device_, options_.view));
-  for (const std::string& warning : scene_->warnings())
-    std::fprintf(stderr, "relit: warning: %s\n", warning.c_str());
-  if (camera_.distance <= 0) {
-    const auto& low = clip_.clip().bounds_min;
-    const auto& high = clip_.clip().bounds_max;
-    const glm::vec3 size(high[0] - low[0], high[1] - low[1], high[2] - low[2]);
-    camera_.distance = 0.5 * static_cast<double>(glm::length(size)) /
-                       std::sin(glm::radians(0.5 * camera_.field_of_view_deg));
+  // Late pictures are shown at once where the driver can do that.
+  if (SDL_GL_SetSwapInterval(-1) != 0) SDL_GL_SetSwapInterval(1);
+  const auto make_device = [this] {
+    gles::DeviceOptions device;
+    device.get_proc_address = [](const char* name) { return SDL_GL_GetProcAddress(name); };
+    if (!es3_) device.profile = gles::Profile::kEs2;
+    return gles::Device::create(device);
+  };
+  RELIT_ASSIGN(device_, make_device());
+  RELIT_ASSIGN(overlay_, gles::Overlay::create(*device_));
+  statistics_.renderer = device_->is_es3() ? "OpenGL ES 3" : "OpenGL ES 2";
+  const std::string& renderer = device_->caps().renderer;
+  if (!renderer.empty()) statistics_.renderer += ", " + renderer.substr(0, renderer.find(' '));
+  RELIT_ASSIGN(session_, WindowSession::create(options_, make_device));
+  SDL_EventState(SDL_DROPFILE, SDL_ENABLE);
+  SDL_EventState(SDL_DROPTEXT, SDL_ENABLE);
+  SDL_StartTextInput();
+  if (options_.fullscreen) set_fullscreen(true);
+  return {};
+}
+
+Status Window::run() {
+  while (!leave_) {
+    SDL_Event event;
+    while (SDL_PollEvent(&event) != 0) handle(event);
+    RELIT_TRY(serve_requests());
+    if (leave_) break;
+    RELIT_TRY(show());
+    if (options_.max_shown != 0 && shown_ >= options_.max_shown) break;
   }
   return {};
 }
@@ -159,184 +173,151 @@ void Window::handle(const SDL_Event& event) {
   switch (event.type) {
     case SDL_QUIT:
       leave_ = true;
-      break;
-    case SDL_KEYDOWN:
-      handle_key(event.key.keysym.sym);
-      break;
-    case SDL_MOUSEMOTION:
-      handle_motion(event.motion);
-      break;
-    case SDL_MOUSEWHEEL:
-      camera_.distance = std::clamp(camera_.distance * std::pow(0.9, event.wheel.y), 1e-3, 1e6);
-      redraw_ = true;
-      break;
+      return;
     case SDL_WINDOWEVENT:
-      redraw_ = true;
-      break;
+      exposed_ = true;
+      if (event.window.event == SDL_WINDOWEVENT_LEAVE) pointer_.left();
+      return;
+    case SDL_DROPFILE:
+    case SDL_DROPTEXT:
+      if (event.drop.file != nullptr) session_->drop(event.drop.file);
+      SDL_free(event.drop.file);
+      return;
     default:
       break;
   }
+  actions_.clear();
+  if (events_.translate(event, points_per_unit_, actions_)) pointer_.moved(now_s());
+  for (const Action& action : actions_) session_->act(action);
+  // Panels come and go, and messages.
+  exposed_ = exposed_ || !actions_.empty();
 }
 
-void Window::handle_key(SDL_Keycode key) {
-  redraw_ = true;
-  switch (key) {
-    case SDLK_ESCAPE:
-    case SDLK_q:
+Status Window::serve_requests() {
+  const WindowSession::Requests requests = session_->take_requests();
+  if (requests.quit) leave_ = true;
+  if (requests.fullscreen) set_fullscreen(!fullscreen_);
+  if (requests.escape) {
+    if (fullscreen_) {
+      set_fullscreen(false);
+    } else {
       leave_ = true;
-      break;
-    case SDLK_SPACE:
-      paused_ = !paused_;
-      break;
-    case SDLK_LEFT:
-      step(-1);
-      break;
-    case SDLK_RIGHT:
-      step(1);
-      break;
-    case SDLK_l:
-      light_ = (light_ + 1) % lights_.size();
-      light_turn_rad_ = 0;
-      light_changed_ = true;
-      break;
-    case SDLK_PLUS:
-    case SDLK_EQUALS:
-    case SDLK_KP_PLUS:
-      scene_->scale_exposure(1.1892071f);  // a quarter of a stop
-      break;
-    case SDLK_MINUS:
-    case SDLK_KP_MINUS:
-      scene_->scale_exposure(1 / 1.1892071f);
-      break;
-    case SDLK_f:
-      fullscreen_ = !fullscreen_;
-      SDL_SetWindowFullscreen(window_.get(), fullscreen_ ? SDL_WINDOW_FULLSCREEN_DESKTOP : 0);
-      break;
-    case SDLK_s:
-      want_screenshot_ = true;
-      break;
-    default:
-      break;
+    }
   }
-}
-
-void Window::handle_motion(const SDL_MouseMotionEvent& motion) {
-  const bool left = (motion.state & SDL_BUTTON_LMASK) != 0,
-             right = (motion.state & SDL_BUTTON_RMASK) != 0;
-  if (!left && !right) return;
-  constexpr double kDegreesPerPixel = 0.4;
-  if (right || (SDL_GetModState() & KMOD_SHIFT) != 0) {
-    light_turn_rad_ += glm::radians(kDegreesPerPixel * motion.xrel);
-    light_turned_ = true;
-    return;
+  if (requests.screenshot && width_px_ > 0) {
+    auto written = write_screenshot(*device_, width_px_, height_px_, [&](int width, int height) {
+      return session_->draw(width, height);
+    });
+    if (written) {
+      session_->say("screenshot: " + *written);
+    } else {
+      session_->say(written.error().message, true);
+    }
+    exposed_ = true;
   }
-  camera_.azimuth_deg -= kDegreesPerPixel * motion.xrel;
-  camera_.elevation_deg =
-      std::clamp(camera_.elevation_deg + kDegreesPerPixel * motion.yrel, -89.0, 89.0);
-  redraw_ = true;
-}
-
-// To the frame before or behind the one that is shown, around the ends.
-void Window::step(int frames) {
-  paused_ = true;
-  const std::uint64_t count = clip_.clip().duration_ticks, start = clip_.first_tick(shown_frame_);
-  position_ = static_cast<double>(
-      (frames > 0 ? start + clip_.ticks_of(shown_frame_) : start + count - 1) % count);
-}
-
-void Window::advance_clock() {
-  const Clock::time_point now = Clock::now();
-  const double elapsed_s = std::chrono::duration<double>(now - last_tick_).count();
-  last_tick_ = now;
-  if (paused_) return;
-  const auto count = static_cast<double>(clip_.clip().duration_ticks);
-  position_ += elapsed_s * ticks_per_s();
-  position_ = clip_.clip().loop ? std::fmod(position_, count) : std::min(position_, count - 1);
-}
-
-// Brings the scene up to the frame and the light of the moment.
-Status Window::update() {
-  RELIT_ASSIGN(const std::uint64_t wanted, clip_.frame_at(static_cast<std::uint64_t>(position_)));
-  const bool new_frame = wanted != shown_frame_;
-  if (!new_frame && !light_changed_ && !light_turned_) return {};
-  if (light_changed_) RELIT_TRY(scene_->set_light(lights_[light_]));
-  if (light_turned_) RELIT_TRY(scene_->turn_light(lights_[light_], light_turn_rad_));
-  light_changed_ = light_turned_ = false;
-  if (new_frame) RELIT_TRY(clip_.frame(wanted, frame_));
-  shown_frame_ = wanted;
-  RELIT_TRY(scene_->set_frame(frame_));
-  redraw_ = true;
   return {};
+}
+
+void Window::set_fullscreen(bool fullscreen) {
+  fullscreen_ = fullscreen;
+  SDL_SetWindowFullscreen(window_.get(), fullscreen ? SDL_WINDOW_FULLSCREEN_DESKTOP : 0);
+  exposed_ = true;
+}
+
+void Window::update_pointer(double now) {
+  const bool shown = !fullscreen_ || !pointer_.resting(now) || events_.input().dragging();
+  if (shown == pointer_shown_) return;
+  pointer_shown_ = shown;
+  SDL_ShowCursor(shown ? SDL_ENABLE : SDL_DISABLE);
+}
+
+// By the display where it says so; else by the size, as on a large screen of many pixels one sits
+// farther away or has small pixels.
+int Window::ui_scale(int window_height, int drawable_height) const {
+  if (options_.ui_scale > 0) return options_.ui_scale;
+  const double ratio = static_cast<double>(drawable_height) / std::max(window_height, 1);
+  const double by_size = static_cast<double>(drawable_height) / 1080;
+  return std::clamp(static_cast<int>(std::lround(std::max(ratio, by_size))), 1,
+                    gles::FontAtlas::kMaxScale);
 }
 
 Status Window::show() {
-  RELIT_TRY(update());
-  if (!redraw_) {
-    SDL_Delay(2);
+  const double now = now_s();
+  if (const Status updated = session_->update(now); !updated) {
+    // Without GL nothing can be shown; anything else is told, and what is there stays.
+    if (updated.error().code == ErrorCode::kEnvironment) return updated;
+    session_->say(updated.error().message, true);
+  }
+  update_pointer(now);
+  const bool overlay =
+      events_.input().scrubbing() || pointer_.visibility(now) > 0 || session_->has_overlay();
+  const bool draw = exposed_ || session_->changed() || overlay || overlay_shown_;
+  if (!draw) {
+    SDL_WaitEventTimeout(nullptr,
+                         static_cast<int>(std::clamp(session_->idle_s(), 0.001, 0.1) * 1e3));
     return {};
   }
-  redraw_ = false;
-  int width = 0, height = 0;
-  SDL_GL_GetDrawableSize(window_.get(), &width, &height);
-  if (width < 1 || height < 1) return {};
-  RELIT_TRY(scene_->draw(camera_, width, height));
-  if (want_screenshot_) RELIT_TRY(screenshot());
-  SDL_GL_SwapWindow(window_.get());
-  ++shown_, ++counted_;
-  update_title();
-  return {};
-}
-
-// The picture as it stands, drawn again off the screen, under the first number that is free.
-Status Window::screenshot() {
-  want_screenshot_ = false;
-  int width = 0, height = 0;
-  SDL_GL_GetDrawableSize(window_.get(), &width, &height);
-  RELIT_ASSIGN(gles::Framebuffer framebuffer,
-               gles::Framebuffer::create(*device_, {width, height, 4}));
-  GLint screen = 0;
-  device_->gl().GetIntegerv(GL_FRAMEBUFFER_BINDING, &screen);
-  framebuffer.bind();
-  RELIT_TRY(scene_->draw(camera_, framebuffer.draw_width(), framebuffer.draw_height()));
-  RELIT_TRY(framebuffer.resolve());
-  std::vector<std::uint8_t> rgba(std::size_t{4} * static_cast<std::size_t>(width) *
-                                 static_cast<std::size_t>(height));
-  RELIT_TRY(framebuffer.read_back(rgba));
-  device_->gl().BindFramebuffer(GL_FRAMEBUFFER, static_cast<GLuint>(screen));
-  PictureWriter::Options options;
-  options.width = width, options.height = height;
-  for (int number = 1; number < 10000; ++number) {
-    char name[32];
-    std::snprintf(name, sizeof name, "relit-%04d.png", number);
-    options.path = name;
-    if (!std::filesystem::exists(options.path)) break;
+  exposed_ = false;
+  overlay_shown_ = overlay;
+  SDL_GL_GetDrawableSize(window_.get(), &width_px_, &height_px_);
+  if (width_px_ < 1 || height_px_ < 1) {
+    SDL_WaitEventTimeout(nullptr, 50);
+    return {};
   }
-  RELIT_ASSIGN(auto writer, PictureWriter::create(options));
-  RELIT_TRY(writer->add(rgba));
-  RELIT_TRY(writer->finish());
-  std::fprintf(stderr, "relit: %s\n", options.path.c_str());
+  RELIT_TRY(session_->draw(width_px_, height_px_));
+  draw_overlay_model(now);
+  RELIT_TRY(overlay_->draw(canvas_));
+  const double before_swap = now_s();
+  SDL_GL_SwapWindow(window_.get());
+  statistics_.stages[4] = {"present", 1e3 * (now_s() - before_swap)};
+  count_picture(now_s());
+  if (session_->title() != shown_title_) {
+    shown_title_ = session_->title();
+    SDL_SetWindowTitle(window_.get(), (shown_title_ + " – relit").c_str());
+  }
   return {};
 }
 
-void Window::update_title() {
-  const double elapsed_s = std::chrono::duration<double>(Clock::now() - counted_since_).count();
-  if (elapsed_s < 0.5) return;
-  shown_per_s_ = static_cast<double>(counted_) / elapsed_s;
-  counted_ = 0, counted_since_ = Clock::now();
-  char title[256];
-  std::snprintf(title, sizeof title, "%s: %s, frame %llu of %llu, %.0f pictures/s, light %s",
-                options_.title.c_str(), clip_.clip().name.c_str(),
-                static_cast<unsigned long long>(shown_frame_),
-                static_cast<unsigned long long>(clip_.clip().frame_count), shown_per_s_,
-                lights_[light_].name.c_str());
-  SDL_SetWindowTitle(window_.get(), title);
+void Window::draw_overlay_model(double now) {
+  int window_width = 1, window_height = 1;
+  SDL_GetWindowSize(window_.get(), &window_width, &window_height);
+  const int scale = ui_scale(window_height, height_px_);
+  canvas_.begin(width_px_, height_px_, scale);
+  points_per_unit_ = canvas_.height() / static_cast<float>(std::max(window_height, 1));
+  const ControlLayout layout = layout_controls(canvas_.width(), canvas_.height());
+  model_.controls = events_.input().scrubbing() ? 1 : pointer_.visibility(now);
+  session_->fill(model_, statistics_);
+  statistics_.width_px = width_px_, statistics_.height_px = height_px_;
+  // Hidden controls are not hit.
+  const bool there = model_.controls > 0;
+  const auto area = [&](const gles::OverlayRect& rect) {
+    return there ? ControlArea{rect.x, rect.y, rect.width, rect.height} : ControlArea{};
+  };
+  events_.input().set_layout(canvas_.height(), area(layout.bar), area(layout.pause));
+  draw_overlay(canvas_, model_);
+}
+
+void Window::count_picture(double now) {
+  ++shown_, ++counted_;
+  if (last_picture_s_ > 0)
+    statistics_.picture_ms.add(static_cast<float>(1e3 * (now - last_picture_s_)));
+  last_picture_s_ = now;
+  const WindowStatistics::Memory& ring = statistics_.memory[0];
+  if (ring.limit_bytes > 0)
+    statistics_.buffer.add(static_cast<float>(static_cast<double>(ring.bytes) /
+                                              static_cast<double>(ring.limit_bytes)));
+  if (now - counted_since_s_ < 0.5) return;
+  statistics_.pictures_per_s = static_cast<double>(counted_) / (now - counted_since_s_);
+  counted_ = 0, counted_since_s_ = now;
 }
 
 }  // namespace
 
-Status play_in_window(ClipReader& clip, std::span<const LoadedLight> lights,
-                      const WindowOptions& options) {
-  return Window(clip, lights, options).run();
+Result<PlaybackLoss> play_in_window(const WindowOptions& options) {
+  Window window(options);
+  RELIT_TRY(window.open());
+  RELIT_TRY(window.run());
+  return window.loss();
 }
 
 }  // namespace relit::player

@@ -1,7 +1,9 @@
 VARYING vec2 v_light_map_uv;
 VARYING vec2 v_albedo_uv;
 VARYING vec4 v_color;
+#ifndef FUSED
 uniform sampler2D u_light_map;
+#endif
 uniform vec4 u_base_color;
 uniform float u_light_scale;  // from the texture's values to exposed radiance
 #ifdef MANUAL_BILINEAR
@@ -15,7 +17,9 @@ uniform float u_alpha_cutoff;
 #endif
 
 vec3 light() {
-#ifdef MANUAL_BILINEAR
+#ifdef FUSED
+  vec3 value = fused_light(v_light_map_uv);
+#elif defined(MANUAL_BILINEAR)
   vec2 p = v_light_map_uv * u_light_map_size.xy - 0.5;
   vec2 corner = floor(p);
   vec2 f = p - corner;

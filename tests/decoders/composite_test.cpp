@@ -230,6 +230,64 @@ TEST_CASE("every kernel keeps the bound for every width, depth and shift") {
   }
 }
 
+TEST_CASE("a light map of half size is every second texel of the full one, bit for bit") {
+  Random random(14);
+  for (int width = 1; width <= 67; ++width) {
+    CAPTURE(width);
+    Scene scene(width, pick(random, 1, 7));
+    for (int depth : {8, 10}) {
+      for (int mantissa_shift : {0, 1}) {
+        for (int exponent_shift = -1; exponent_shift <= 5; ++exponent_shift) {
+          scene.add(random, depth, mantissa_shift, exponent_shift).scale = uniform(random, -3, 3);
+          if (pick(random, 0, 1) == 0) scene.weights.back() = {0, 1.5f, 0};
+        }
+      }
+    }
+    scene.finish();
+    scene.job.run_scalar();
+    const std::vector<float> full = scene.out;
+    CompositeJob half = scene.job;
+    half.every = 2;
+    std::vector<float> out(static_cast<std::size_t>(3 * half.out_width() * half.out_height()));
+    half.out = out;
+    REQUIRE(half.validate());
+    for (const CompositeKernel& kernel : composite_kernels()) {
+      CAPTURE(kernel.name);
+      std::fill(out.begin(), out.end(), -7e33f);
+      kernel.run(half);
+      std::size_t at = 0, different = 0;
+      for (int c = 0; c < 3; ++c) {
+        for (int y = 0; y < half.height; y += 2) {
+          for (int x = 0; x < width; x += 2, ++at) {
+            const int texel = (c * half.height + y) * width + x;
+            different += out[at] != full[static_cast<std::size_t>(texel)];
+          }
+        }
+      }
+      CHECK(at == out.size());
+      CHECK(different == 0);
+    }
+  }
+  Scene wide(4095, 3);  // more than one tile, and an odd end
+  wide.add(random, 8, 0, 0);
+  wide.add(random, 10, 1, 3);
+  wide.finish();
+  wide.job.run_scalar();
+  const std::vector<float> full = wide.out;
+  wide.job.every = 2;
+  wide.out.resize(static_cast<std::size_t>(3 * 2048 * 2));
+  wide.job.out = wide.out;
+  REQUIRE(wide.job.validate());
+  for (const CompositeKernel& kernel : composite_kernels()) {
+    CAPTURE(kernel.name);
+    kernel.run(wide.job);
+    CHECK(wide.out[2047] == full[4094]);
+    CHECK(wide.out[2048 + 1024] == full[2 * 4095 + 2048]);
+  }
+  wide.job.every = 3;
+  CHECK_FALSE(wide.job.validate());
+}
+
 TEST_CASE("every kernel keeps the bound with exponents from one end to the other") {
   Random random(4);
   const std::array<int, 8> ends{0, 1, 8, 9, 128, 135, 254, 255};

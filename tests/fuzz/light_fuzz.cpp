@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: MIT
+#include <cmath>
 #include <cstdint>
 #include <string>
 #include <vector>
 
 #include "decoders/sh.hpp"
-#include "player/light.hpp"
+#include "player/light_field.hpp"
 #include "player/light_file.hpp"
 #include "tests/fuzz/fuzz.hpp"
 
 /// Hostile lights: the first byte says whether the rest is an .hdr, an .exr or a .json. What is
-/// accepted has the pixels it should, and a .json is read again from what is written of it.
+/// accepted has the pixels it should; a .json is finite everywhere and always, and is read again
+/// from what is written of it.
 namespace {
 
 using namespace relit;
@@ -41,14 +43,25 @@ void check_environment(const Result<decoders::Environment>& picture) {
 }
 
 void check_json(Input bytes) {
-  const auto light = player::read_light_json(bytes);
-  if (!check_light(light)) return;
-  require(light->order() >= 0 && light->order() <= 3);
-  const auto text = player::light_json(*light);
-  require(text.has_value());
+  const auto field = player::read_light_field(bytes);
+  if (!check_light(field)) return;
+  require(field->order() >= 0 && field->order() <= 3);
+  require(field->parts().lights.size() <= player::LightField::kMostLights);
+  decoders::Light light;
+  for (const double time_s : {0.0, -1.0, 0.3, 1e30, std::nan("")}) {
+    for (const float place : {0.0f, 0.7f, -1e30f, std::nanf("")}) {
+      field->sample(time_s, {place, 1, place}, light);
+      require(light.order() == field->order());
+      for (const auto& row : light.sh)
+        for (const double value : row) require(std::isfinite(value));
+    }
+  }
+  const std::string text = player::light_field_json(*field);
   const auto again =
-      player::read_light_json({reinterpret_cast<const std::uint8_t*>(text->data()), text->size()});
-  require(again.has_value() && again->sh == light->sh);
+      player::read_light_field({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
+  require(again.has_value() && player::light_field_json(*again) == text);
+  require(again->parts().times_s == field->parts().times_s);
+  require(again->parts().grid == field->parts().grid);
 }
 
 }  // namespace

@@ -271,6 +271,17 @@ void add_lights(Seeds& seeds) {
   seeds.add("light_fuzz", "json1", text("j{\"sh\": [[1, 2.5, -3e-2]]}"));
   seeds.add("light_fuzz", "json4",
             text("j{\"sh\": [[1,1,1],[0,0.5,0],[0,0,1],[0.25,0,0]], \"name\": \"x\"}"));
+  seeds.add(
+      "light_fuzz", "json_keys",
+      text("j{\"loop\": true, \"interpolation\": \"step\", \"period_s\": 3,\n"
+           "\"keys\": [{\"time_s\": 0, \"sh\": [[1,1,1]]}, {\"time_s\": 2, \"sh\": [[2,0,1]]}]}"));
+  const std::string grid = "\"origin\": [0,-1,0.5], \"spacing\": [1,2,0.5], \"size\": [2,1,1]";
+  seeds.add("light_fuzz", "json_probes",
+            text("j{\"probes\": {" + grid + ", \"sh\": [[[1,1,1]], [[2,0,-1]]]}}"));
+  seeds.add("light_fuzz", "json_both",
+            text("j{\"probes\": {" + grid + "}, \"interpolation\": \"linear\", \"keys\": [" +
+                 "{\"time_s\": -1.5, \"sh\": [[[1,1,1]], [[2,0,-1]]]}," +
+                 "{\"time_s\": 1e2, \"sh\": [[[1,1,1]], [[2,0,-1]]]}]}"));
   const std::string header = "h#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n";
   std::string flat = header + "-Y 2 +X 4\n";
   for (int i = 0; i < 8; ++i) flat += std::string("\x80\x40\x90", 3) + static_cast<char>(120 + i);

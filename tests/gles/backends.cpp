@@ -17,6 +17,8 @@ constexpr Backend kBackends[] = {
     {"OSMesa", gles::OffscreenKind::kOsmesa, gles::Profile::kEs3},
 };
 
+thread_local gles::OffscreenContext* current_context = nullptr;
+
 void run(const Backend& backend, const BackendBody& body, const BackendOptions& options) {
   auto context = gles::OffscreenContext::create(backend.kind);
   if (!context && backend.kind == gles::OffscreenKind::kOsmesa) {
@@ -28,11 +30,14 @@ void run(const Backend& backend, const BackendBody& body, const BackendOptions& 
   auto device = gles::Device::create(
       {(*context)->get_proc_address(), backend.profile, options.ignored_extensions});
   if (!device) FAIL(device.error().message);
+  current_context = context->get();
   body(**device, backend);
   CHECK((*device)->gl().GetError() == GLenum{GL_NO_ERROR});
 }
 
 }  // namespace
+
+gles::OffscreenContext& backend_context() { return *current_context; }
 
 void on_each_backend(const BackendBody& body, const BackendOptions& options) {
   // Where Mesa is told to be ES 2 only, there is no ES 3 context to test.

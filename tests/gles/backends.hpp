@@ -23,6 +23,10 @@ struct BackendOptions {
 
 using BackendBody = std::function<void(const gles::Device& device, const Backend& backend)>;
 
+/// The context of the body that runs on this thread: for tests that take it away, or call what a
+/// host would.
+[[nodiscard]] gles::OffscreenContext& backend_context();
+
 /// Each backend gets a thread and a context of its own, one after the other. EGL must exist; OSMesa
 /// is reported as skipped where it does not. After the body no GL error may be pending.
 void on_each_backend(const BackendBody& body, const BackendOptions& options = {});

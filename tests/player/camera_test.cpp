@@ -51,3 +51,49 @@ TEST_CASE("azimuth 0 looks from +Z, and positive azimuth goes towards +X") {
   camera.azimuth_deg = 90;
   CHECK(camera_matrices(camera, glm::vec3(-1), glm::vec3(1), 1).eye.x == Approx(2));
 }
+
+namespace {
+
+// Where a point is seen, -1..1 in both directions.
+glm::vec2 seen(const OrbitCamera& camera, const glm::vec3& at, double aspect) {
+  const CameraMatrices m = camera_matrices(camera, glm::vec3(-1), glm::vec3(1), aspect);
+  const glm::vec4 clip = m.projection * (m.view * glm::vec4(at, 1));
+  return glm::vec2(clip) / clip.w;
+}
+
+}  // namespace
+
+TEST_CASE("panning moves the picture by the part of its height that is asked for") {
+  for (const double azimuth : {0.0, 130.0}) {
+    OrbitCamera camera;
+    camera.azimuth_deg = azimuth, camera.elevation_deg = 35, camera.distance = 4;
+    pan(camera, 0.25, -0.1);
+    // Half the picture's height is 1, and half its width: twice that here.
+    const glm::vec2 at = seen(camera, glm::vec3(0), 2);
+    CHECK(at.x == Approx(2 * 0.25 / 2).margin(1e-5));
+    CHECK(at.y == Approx(-0.2).margin(1e-5));
+    // And it orbits around the new place.
+    orbit(camera, 77, 20);
+    const glm::vec2 still = seen(camera, glm::vec3(camera.offset), 2);
+    CHECK(glm::length(still) < 1e-5f);
+  }
+}
+
+TEST_CASE("orbiting stops at the poles and goes round the equator") {
+  OrbitCamera camera;
+  orbit(camera, 0, 500);
+  CHECK(camera.elevation_deg == 89);
+  orbit(camera, 0, -500);
+  CHECK(camera.elevation_deg == -89);
+  camera.azimuth_deg = 170;
+  orbit(camera, 20, 0);
+  CHECK(camera.azimuth_deg == Approx(-170));
+}
+
+TEST_CASE("distance 0 is the fitting distance") {
+  OrbitCamera camera;
+  const CameraMatrices fitted = camera_matrices(camera, glm::vec3(-1), glm::vec3(1), 1.5);
+  camera.distance = fitting_distance(camera, glm::vec3(-1), glm::vec3(1), 1.5);
+  const CameraMatrices same = camera_matrices(camera, glm::vec3(-1), glm::vec3(1), 1.5);
+  CHECK(glm::length(fitted.eye - same.eye) < 1e-6f);
+}

@@ -126,7 +126,7 @@ TEST_CASE("JSON that is no light is refused by place") {
   std::string rows = "[1,1,1]";
   for (int n = 1; n < 25; ++n) rows += ",[1,1,1]";
   CHECK(says(load("{\"sh\": [" + rows + "]}"), "25 rows"));
-  CHECK(load("{\"sh\": [[1,1,1]]" + std::string(2 << 20, ' ') + "}").error().code ==
+  CHECK(load("{\"sh\": [[1,1,1]]" + std::string(5 << 20, ' ') + "}").error().code ==
         ErrorCode::kLimit);
 }
 

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <bit>
+#include <cstdio>
+
+#include "gles/plane_pass.hpp"
+#include "gles/shaders.hpp"
+
+namespace relit::gles {
+namespace {
+
+constexpr const char* kBatchNames[] = {"BATCH_WEIGHTS",  "BATCH_PLANES",  "BATCH_MANTISSA",
+                                       "BATCH_SHEET_0",  "BATCH_SHEET_1", "BATCH_SHEET_2",
+                                       "BATCH_EXPONENTS"};
+
+std::string define(const std::string& name, const std::string& value) {
+  return "#define " + name + " " + value + "\n";
+}
+
+std::string undefine(const std::string& name) { return "#undef " + name + "\n"; }
+
+std::string channel_names(unsigned channels) {
+  std::string names;
+  for (unsigned c = 0; c < 3; ++c)
+    if ((channels >> c & 1u) != 0) names += "rgb"[c];
+  return names.empty() ? "r" : names;
+}
+
+// Ten digits tell any two floats apart.
+std::string vector_of(const std::array<float, 4>& v) {
+  char text[96];
+  std::snprintf(text, sizeof text, "vec4(%.9e, %.9e, %.9e, %.9e)", static_cast<double>(v[0]),
+                static_cast<double>(v[1]), static_cast<double>(v[2]), static_cast<double>(v[3]));
+  return text;
+}
+
+}  // namespace
+
+std::string PlanePass::sheet_name(int sheet) const {
+  const auto unit = std::find(sheets_.begin(), sheets_.end(), sheet) - sheets_.begin();
+  return "u_sheet" + std::to_string(unit);
+}
+
+std::string PlanePass::samplers() const {
+  std::string text;
+  for (int unit = 0; unit < unit_count(); ++unit)
+    text += "uniform sampler2D u_sheet" + std::to_string(unit) + ";\n";
+  if constexpr (std::endian::native == std::endian::big) text += define("BIG_ENDIAN", "1");
+  return text + std::string(shaders::composite_head);
+}
+
+std::string PlanePass::batch_text(std::size_t index, int groups) const {
+  const Batch& batch = batches_[index];
+  const std::string weights = "u_weight" + std::to_string(index);
+  std::string text = define("BATCH_PLANES", std::to_string(batch.planes_per_group));
+  text += define("BATCH_WEIGHTS", weights);
+  text += define("BATCH_MANTISSA",
+                 std::string(is_raw(batch) ? "raw" : "mantissa") + (batch.wide ? "10" : "8"));
+  for (int i = 0; i < batch.planes_per_group; ++i)
+    text += define("BATCH_SHEET_" + std::to_string(i),
+                   sheet_name(batch.sheets[static_cast<std::size_t>(i)]));
+  if (batch.exponent_sheet >= 0)
+    text += define("BATCH_EXPONENTS", sheet_name(batch.exponent_sheet));
+  return text + "uniform vec4 " + weights + "[" + std::to_string(groups * batch.planes_per_group) +
+         "];\n";
+}
+
+std::string PlanePass::place_text(const Group& group, const Batch& batch, int lookup,
+                                  const PlaneSheets& sheets) {
+  const bool exponent = lookup == batch.planes_per_group;
+  const std::size_t k = plane_of(group, exponent ? 0 : lookup);
+  return vector_of(sheets.coordinates(exponent ? sheets.exponent(k) : sheets.mantissa(k)));
+}
+
+std::string PlanePass::text(PlaneTaps taps, std::span<const int> counts,
+                            const PlaneSheets& sheets) const {
+  std::string text = samplers();
+  if (taps == PlaneTaps::kFour) text += define("FOUR_TAPS", "1");
+  text += shaders::composite_taps;
+  std::string sums;
+  for (std::size_t b = 0; b < batches_.size(); ++b) {
+    const Batch& batch = batches_[b];
+    if (counts[b] == 0) continue;
+    const std::string name = "sum" + std::to_string(b) + "()";
+    text += batch_text(b, counts[b]);
+    text += "vec3 " + name + " {\n  vec3 sum = vec3(0.0);\n  vec2 low, high;\n";
+    for (int g = 0; g < counts[b]; ++g) {
+      std::string names = define("GROUP", std::to_string(g)), after = undefine("GROUP");
+      for (int i = 0; i < batch.lookups(); ++i) {
+        const std::string place =
+            i == batch.planes_per_group ? "PLACE_E" : "PLACE_" + std::to_string(i);
+        names +=
+            define(place, place_text(batch.groups[static_cast<std::size_t>(g)], batch, i, sheets));
+        after += undefine(place);
+      }
+      for (std::size_t i = 0; i < 3; ++i) {
+        const std::string channels = "CHANNELS_" + std::to_string(i);
+        names +=
+            define(channels, channel_names(batch.groups[static_cast<std::size_t>(g)].channels[i]));
+        after += undefine(channels);
+      }
+      text += names + std::string(shaders::composite_group) + after;
+    }
+    text += "  return sum;\n}\n";
+    for (const char* each : kBatchNames) text += undefine(each);
+    sums += " + " + name;
+  }
+  return text + "vec3 plane_sum() { return u_constant" + sums + "; }\n";
+}
+
+PlanePass::LookupText PlanePass::lookup_text(const PlaneSheets& sheets) const {
+  LookupText text;
+  text.uniforms = samplers();
+  if (batches_.empty()) return text;
+  const Batch& batch = batches_.front();
+  text.uniforms += batch_text(0, batch.count());
+  std::size_t varying = 0;
+  for (int g = 0; g < batch.count(); ++g) {
+    std::string names = define("GROUP", std::to_string(g)), after = undefine("GROUP");
+    for (int i = 0; i < batch.lookups(); ++i) {
+      const std::string v = "v" + std::to_string(varying++);
+      const std::string name =
+          i == batch.planes_per_group ? "GROUP_UV_E" : "GROUP_UV_" + std::to_string(i);
+      const std::string place =
+          place_text(batch.groups[static_cast<std::size_t>(g)], batch, i, sheets);
+      text.varyings += "VARYING vec2 " + v + ";\n";
+      text.assignments += "  " + v + " = " + place + ".xy + texel * " + place + ".zw;\n";
+      names += define(name, v);
+      after += undefine(name);
+    }
+    text.statements += names + std::string(shaders::composite_unrolled) + after;
+  }
+  return text;
+}
+
+}  // namespace relit::gles

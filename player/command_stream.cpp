@@ -1,0 +1,332 @@
+// SPDX-License-Identifier: MIT
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <thread>
+
+#include "decoders/composite.hpp"
+#include "player/command.hpp"
+#include "player/http_source.hpp"
+#include "player/prefetcher.hpp"
+
+namespace relit::player {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+struct Arguments {
+  SourceArguments source;
+  std::string clip, decoder, sink = "planes";
+  LightArguments light;
+  int layers = -1;
+  int threads = 1;
+  std::uint64_t ring_bytes = std::uint64_t{32} << 20;
+  std::uint64_t loops = 1;
+  double seconds = 0;
+  bool realtime = false, json = false;
+};
+
+double seconds_since(Clock::time_point begin) {
+  return std::chrono::duration<double>(Clock::now() - begin).count();
+}
+
+/// How full the ring was, at even distances over the whole time.
+class BufferLevels {
+ public:
+  struct Level {
+    double time_s;
+    std::size_t frames, ring_bytes, packet_bytes;
+  };
+  [[nodiscard]] bool due(double time_s) const { return time_s >= next_s_; }
+  void add(double time_s, const PrefetchStats& stats) {
+    levels_.push_back({time_s, stats.ring_frames, stats.ring_bytes, stats.packet_bytes});
+    next_s_ = time_s + distance_s_;
+    if (levels_.size() < kMost) return;
+    for (std::size_t i = 0; i < kMost / 2; ++i) levels_[i] = levels_[2 * i];
+    levels_.resize(kMost / 2);
+    distance_s_ *= 2;
+  }
+  [[nodiscard]] const std::vector<Level>& levels() const { return levels_; }
+
+ private:
+  static constexpr std::size_t kMost = 256;
+  std::vector<Level> levels_;
+  double distance_s_ = 0.05, next_s_ = 0;
+};
+
+/// Composites frames on the CPU, as a player without a GPU would.
+class Composite {
+ public:
+  Status open(const Prefetcher& clip, const LightArguments& arguments) {
+    RELIT_ASSIGN(const LoadedLight light, load_light(arguments, clip.model().order));
+    RELIT_TRY(decoders::fold_light(clip.model(), clip.layers(), light.light, folded_));
+    width_ = clip.model().width;
+    height_ = clip.model().height;
+    out_.resize(std::size_t{3} * clip.model().width * clip.model().height);
+    return {};
+  }
+  Status take(const ClipFrame& frame) {
+    decoders::CompositeJob job;
+    job.planes = frame.planes.planes();
+    job.light = folded_.view;
+    job.width = width_, job.height = height_;
+    job.out = out_;
+    RELIT_TRY(job.validate());
+    job.run();
+    return {};
+  }
+
+ private:
+  decoders::FoldedWeights folded_;
+  int width_ = 0, height_ = 0;
+  std::vector<float> out_;
+};
+
+class Stream {
+ public:
+  static Result<Stream> open(const Arguments& arguments);
+  /// Plays until the end, or as long as was asked for.
+  Status play();
+  void print_json() const;
+  void print_summary() const;
+  [[nodiscard]] PlaybackLoss loss() const { return clip_->loss(); }
+
+ private:
+  explicit Stream(const Arguments& arguments) : arguments_(arguments) {}
+  Status show(std::uint64_t index);
+  Status show_in_time(std::uint64_t index, Clock::time_point due);
+  void observe();
+  [[nodiscard]] Clock::duration ticks(std::uint64_t count) const;
+  [[nodiscard]] bool over() const {
+    return arguments_.seconds > 0 && seconds_since(began_) >= arguments_.seconds;
+  }
+
+  Arguments arguments_;
+  Clock::time_point began_ = Clock::now();
+  std::unique_ptr<Prefetcher> clip_;
+  std::optional<Composite> composite_;
+  BufferLevels levels_;
+  double progress_s_ = 0;
+  double open_s_ = 0, first_s_ = 0, play_s_ = 0;
+  std::uint64_t frames_ = 0, late_ = 0, dropped_ = 0;
+};
+
+Result<Stream> Stream::open(const Arguments& arguments) {
+  Stream stream(arguments);
+  const auto interrupt = std::make_shared<Interrupt>();
+  SourceOptions reading;
+  reading.http_headers = arguments.source.http_headers;
+  reading.sparing = arguments.layers >= 0;
+  reading.interrupt = Interrupt::poll(interrupt);
+  reading.warn = [](const std::string& sentence) {
+    std::fprintf(stderr, "relit: warning: %s\n", sentence.c_str());
+  };
+  const std::string& name = arguments.source.name;
+  RELIT_ASSIGN(auto bytes, open_source(name, reading));
+  RELIT_ASSIGN(auto demuxer,
+               ClipDemuxer::open(std::move(bytes), name == "-" ? "standard input" : name,
+                                 {arguments.clip, reading.sparing, interrupt}));
+  PrefetchOptions options;
+  options.ring_bytes = static_cast<std::size_t>(arguments.ring_bytes);
+  options.decoder = arguments.decoder;
+  options.loop = arguments.loops != 1 && demuxer.seekable();
+  options.layers.assign(demuxer.layers().size(), 1);
+  for (std::size_t i = 0; i < options.layers.size() && arguments.layers >= 0; ++i) {
+    if (i >= static_cast<std::size_t>(arguments.layers)) options.layers[i] = 0;
+  }
+  RELIT_ASSIGN(auto pool, WorkerPool::create(arguments.threads));
+  RELIT_ASSIGN(stream.clip_, Prefetcher::create(std::move(demuxer), std::move(pool), options));
+  if (arguments.sink == "composite") {
+    stream.composite_.emplace();
+    RELIT_TRY(stream.composite_->open(*stream.clip_, arguments.light));
+  }
+  stream.open_s_ = seconds_since(stream.began_);
+  return stream;
+}
+
+Clock::duration Stream::ticks(std::uint64_t count) const {
+  const auto& rate = clip_->clip().tick_rate;
+  return std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(
+      static_cast<double>(count) * static_cast<double>(rate.den) / static_cast<double>(rate.num)));
+}
+
+Status Stream::show(std::uint64_t index) {
+  constexpr double kStep_s = 0.2;
+  for (;;) {
+    RELIT_ASSIGN(const bool here, clip_->wait(index, kStep_s));
+    observe();
+    if (here) break;
+    if (over()) return {};
+  }
+  const ClipFrame* frame = clip_->frame(index);
+  if (frame == nullptr) return {};
+  if (composite_) RELIT_TRY(composite_->take(*frame));
+  if (first_s_ == 0) first_s_ = seconds_since(began_);
+  ++frames_;
+  return {};
+}
+
+Status Stream::show_in_time(std::uint64_t index, Clock::time_point due) {
+  std::this_thread::sleep_until(due);
+  if (clip_->frame(index) == nullptr) ++late_;
+  return show(index);
+}
+
+Status Stream::play() {
+  const std::uint64_t count = clip_->clip().frame_count;
+  const bool loops = arguments_.loops != 1 && clip_->seekable();
+  const std::uint64_t laps = loops ? arguments_.loops : 1;
+  std::optional<Clock::time_point> due;
+  for (std::uint64_t lap = 0; laps == 0 || lap < laps; ++lap) {
+    for (std::uint64_t k = 0; k < count; ++k) {
+      if (over()) break;
+      const auto lasts = ticks(clip_->ticks_of(k));
+      // Its time is over already: the next one is due.
+      if (due && Clock::now() >= *due + lasts) {
+        ++dropped_;
+        *due += lasts;
+        continue;
+      }
+      clip_->want(k);
+      RELIT_TRY(due ? show_in_time(k, *due) : show(k));
+      if (arguments_.realtime && !due) due = Clock::now();
+      if (due) *due += lasts;
+    }
+    if (over()) break;
+  }
+  play_s_ = seconds_since(began_) - open_s_;
+  return {};
+}
+
+void Stream::observe() {
+  const double now_s = seconds_since(began_);
+  if (levels_.due(now_s)) levels_.add(now_s, clip_->stats());
+  constexpr double kProgress_s = 0.2;
+  if (isatty(STDERR_FILENO) == 0 || now_s < progress_s_ + kProgress_s) return;
+  progress_s_ = now_s;
+  const PrefetchStats stats = clip_->stats();
+  std::fprintf(stderr, "\r%llu frames  %.1f frames/s  ahead %zu frames, %.1f MiB  \033[K",
+               static_cast<unsigned long long>(frames_),
+               static_cast<double>(frames_) / std::max(now_s - open_s_, 1e-9), stats.ring_frames,
+               static_cast<double>(stats.ring_bytes) / (1 << 20));
+}
+
+void Stream::print_summary() const {
+  if (isatty(STDERR_FILENO) != 0) std::fprintf(stderr, "\r\033[K");
+  const PrefetchStats stats = clip_->stats();
+  std::printf("%llu frames in %.2f s: %.1f frames/s; first picture after %.0f ms\n",
+              static_cast<unsigned long long>(frames_), play_s_,
+              static_cast<double>(frames_) / std::max(play_s_, 1e-9), 1e3 * first_s_);
+  std::printf("late %llu, dropped %llu, underruns %llu\n", static_cast<unsigned long long>(late_),
+              static_cast<unsigned long long>(dropped_),
+              static_cast<unsigned long long>(stats.underruns));
+  std::printf("peak memory: pictures %.2f MiB, of which the ring %.2f MiB; packets %.2f MiB\n",
+              static_cast<double>(stats.picture_bytes_peak) / (1 << 20),
+              static_cast<double>(stats.ring_bytes_peak) / (1 << 20),
+              static_cast<double>(stats.packet_bytes_peak) / (1 << 20));
+}
+
+void Stream::print_json() const {
+  const PrefetchStats stats = clip_->stats();
+  const PlaybackLoss lost = clip_->loss();
+  nlohmann::json out{{"source", arguments_.source.name},
+                     {"clip", clip_->clip().name},
+                     {"threads", arguments_.threads},
+                     {"sink", arguments_.sink},
+                     {"realtime", arguments_.realtime},
+                     {"frames", frames_},
+                     {"seconds", play_s_},
+                     {"frames_per_second", static_cast<double>(frames_) / std::max(play_s_, 1e-9)},
+                     {"open_s", open_s_},
+                     {"first_picture_s", first_s_},
+                     {"decode_s", stats.decode_s},
+                     {"late", late_},
+                     {"dropped", dropped_},
+                     {"underruns", stats.underruns}};
+  out["lost"] = {{"frames", lost.frames},
+                 {"records", lost.records},
+                 {"segments", lost.segments},
+                 {"first", lost.first}};
+  out["peak_bytes"] = {{"packets", stats.packet_bytes_peak},
+                       {"pictures", stats.picture_bytes_peak},
+                       {"ring", stats.ring_bytes_peak}};
+  out["tracks"] = nlohmann::json::array();
+  for (const PrefetchStats::Track& track : stats.tracks) {
+    const char* kind = track.layer < 0 ? "pose" : track.exponents ? "exponents" : "mantissas";
+    nlohmann::json entry{{"track", track.track_id}, {"kind", kind}, {"bytes", track.bytes}};
+    if (track.layer >= 0) entry["layer"] = track.layer;
+    out["tracks"].push_back(std::move(entry));
+  }
+  out["buffer"] = nlohmann::json::array();
+  for (const BufferLevels::Level& level : levels_.levels()) {
+    out["buffer"].push_back({{"time_s", level.time_s},
+                             {"frames", level.frames},
+                             {"ring_bytes", level.ring_bytes},
+                             {"packet_bytes", level.packet_bytes}});
+  }
+  out["notes"] = stats.notes;
+  std::printf("%s\n", out.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+}
+
+int run(const Arguments& arguments) {
+  if (arguments.sink == "composite" && arguments.light.path.empty()) {
+    return report({ErrorCode::kInvalid, "stream --sink composite needs a --light"});
+  }
+  auto stream = Stream::open(arguments);
+  if (!stream) return report(stream.error());
+  const Status played = stream->play();
+  if (isatty(STDERR_FILENO) != 0) std::fprintf(stderr, "\r\033[K");
+  if (!played) return report(played.error());
+  if (arguments.json)
+    stream->print_json();
+  else
+    stream->print_summary();
+  return report_loss(stream->loss());
+}
+
+}  // namespace
+
+Command add_stream(CLI::App& app) {
+  CLI::App* command =
+      app.add_subcommand("stream", "play a clip without a window, and tell how it went");
+  const auto a = std::make_shared<Arguments>();
+  add_source_options(*command, a->source, "path, - or http(s)://; a pipe cannot loop");
+  command->add_option("--clip", a->clip, "by name or number");
+  command->add_option("--layers", a->layers, "only the first so many layers");
+  command->add_option("--threads", a->threads, "that decode")
+      ->check(CLI::Range(1, 64))
+      ->capture_default_str();
+  command->add_option("--ring", a->ring_bytes, "bytes of frames decoded ahead, such as 8MiB")
+      ->transform(CLI::AsSizeValue(false))
+      ->capture_default_str();
+  command->add_option("--decoder", a->decoder,
+                      "try this decoder of libavcodec first, such as h264_v4l2m2m");
+  command->add_option("--loops", a->loops, "how often; 0: until --seconds are over")
+      ->capture_default_str();
+  command->add_option("--seconds", a->seconds, "at most so long")->check(CLI::NonNegativeNumber);
+  command->add_flag("--realtime", a->realtime,
+                    "at the clip's own pace, leaving out frames that come too late; otherwise as "
+                    "fast as possible");
+  command
+      ->add_option("--sink", a->sink, "planes: decode alone; composite: with --light, on the CPU")
+      ->check(CLI::IsMember({"planes", "composite"}))
+      ->capture_default_str();
+  command->add_option("--light", a->light.path, ".hdr, .exr (equirectangular) or .json");
+  add_light_options(*command, a->light);
+  command->add_flag("--json", a->json, "the statistics as JSON on standard output");
+  command->footer(
+      "Examples:\n"
+      "  relit stream man.relit --threads 2\n"
+      "  relit stream http://host/man.relit --realtime --loops 0 --seconds 60 --json");
+  return [a] {
+    if (a->loops == 0 && !(a->seconds > 0)) {
+      return report({ErrorCode::kInvalid, "stream --loops 0 needs --seconds"});
+    }
+    return run(*a);
+  };
+}
+
+}  // namespace relit::player

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: MIT
+#include "player/player_light.hpp"
+
+#include <cmath>
+#include <utility>
+
+#include "decoders/sh_constants.hpp"
+
+namespace relit::player {
+
+Result<PlayerLight> PlayerLight::create() {
+  LightFieldParts white;
+  const double level = 1 / decoders::kBand0;
+  white.lights.push_back({{{level, level, level}}});
+  RELIT_ASSIGN(LightField field, LightField::create(std::move(white)));
+  return PlayerLight(std::move(field));
+}
+
+void PlayerLight::set(LightField field, std::shared_ptr<const decoders::Environment> environment,
+                      double rotation_rad) {
+  field_ = std::move(field);
+  environment_ = std::move(environment);
+  rotation_rad_ = rotation_rad;
+  turn_rad_ = 0;
+  ++generation_;
+  stale_ = true;
+}
+
+Status PlayerLight::turn(double angle_rad) {
+  if (!std::isfinite(angle_rad))
+    return fail(ErrorCode::kInvalid, "the angle by which to turn a light is not finite");
+  stale_ |= angle_rad != turn_rad_;
+  turn_rad_ = angle_rad;
+  return {};
+}
+
+void PlayerLight::set_position(const glm::vec3& position) {
+  stale_ |= field_.varies_in_space() && position != position_;
+  position_ = position;
+}
+
+bool PlayerLight::sample(double time_s) {
+  if (!stale_ && !(field_.varies_in_time() && time_s != sampled_s_)) return false;
+  field_.sample(time_s, position_, now_);
+  if (turn_rad_ != 0) decoders::rotate_light_y(now_, turn_rad_);
+  sampled_s_ = time_s;
+  stale_ = false;
+  return true;
+}
+
+float PlayerLight::auto_exposure() const {
+  const decoders::Light mean = field_.mean();
+  const auto& rgb = mean.sh.front();
+  const double luminance = (0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]) * decoders::kBand0;
+  return luminance > 0 ? static_cast<float>(0.8 / luminance) : 1.0f;
+}
+
+}  // namespace relit::player

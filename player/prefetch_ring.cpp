@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: MIT
+// The ring of a Prefetcher: which frames are decoded next, and which may go.
+#include <algorithm>
+
+#include "player/prefetch_state.hpp"
+
+namespace relit::player {
+
+using State = Prefetcher::State;
+
+void State::wake() {
+  for (const auto& track : tracks) track->strand->wake();
+  work.notify_one();
+}
+
+void State::note_peaks() {
+  counts.ring_bytes_peak = std::max(counts.ring_bytes_peak, ring_bytes);
+  counts.packet_bytes_peak = std::max(counts.packet_bytes_peak, packet_bytes + spare_bytes);
+}
+
+State::Slot* State::find(std::uint64_t index) {
+  for (std::uint64_t seq = head; seq < tail; ++seq) {
+    if (at(seq).index == index) return &at(seq);
+  }
+  return nullptr;
+}
+
+std::optional<std::uint64_t> State::following(std::uint64_t index) const {
+  const std::uint64_t count = demuxer.clip().frame_count;
+  const std::uint64_t next = index + 1;
+  if (loop && (next == loop_end || next >= count)) return loop_begin;
+  if (next >= count) return std::nullopt;
+  return next;
+}
+
+// Takes as many frames into the ring as their bytes allow, two at least: playback blends between
+// two.
+void State::admit() {
+  while (next_index && tail - head < ring.size() && admit_one()) {
+  }
+}
+
+bool State::admit_one() {
+  const std::uint64_t index = *next_index;
+  std::erase_if(segments, [&](const Segment& s) {
+    return s.lap < admit_lap || (s.lap == admit_lap && s.end_frame <= index);
+  });
+  const auto found = std::ranges::find_if(segments, [&](const Segment& s) {
+    return s.lap == admit_lap && s.first_frame <= index && index < s.end_frame;
+  });
+  const bool known = found != segments.end();
+  // Frames of segments that never came are lost at once.
+  const bool passed =
+      demux_lap > admit_lap || (demux_lap == admit_lap && (index < come_end || ended));
+  if (!known && !passed) return false;
+  std::size_t expected = 0;
+  for (std::size_t t = 0; known && t < tracks.size(); ++t) {
+    if ((*found->wanted)[t] != 0) expected += tracks[t]->picture_bytes;
+  }
+  constexpr std::uint64_t kLeastFrames = 2;
+  if (ring_bytes + pending_bytes + expected > ring_limit && tail - head >= kLeastFrames) {
+    return false;
+  }
+  if (free_slots.empty()) {
+    slots.push_back(std::make_unique<Slot>());
+    free_slots.reserve(slots.size());
+    free_slots.push_back(slots.back().get());
+  }
+  Slot* slot = free_slots.back();
+  free_slots.pop_back();
+  slot->index = index;
+  lay_out(*slot, known ? &*found : nullptr);
+  ring[tail++ % ring.size()] = slot;
+  next_index = following(index);
+  if (next_index && *next_index <= index) ++admit_lap;
+  return true;
+}
+
+void State::lay_out(Slot& slot, const Segment* segment) {
+  slot.segment_no = segment != nullptr ? segment->no : 0;
+  slot.parts.resize(tracks.size());
+  slot.missing = 0;
+  slot.first = std::exchange(admit_first, false);
+  slot.lost = segment == nullptr;
+  slot.counted = slot.laid_out = false;
+  for (std::size_t t = 0; t < tracks.size(); ++t) {
+    Part& part = slot.parts[t];
+    part.picture.clear();
+    part.wanted = segment != nullptr && (*segment->wanted)[t] != 0;
+    part.done = part.taken = part.shares_previous = false;
+    part.charged = 0;
+    part.expected = part.wanted ? tracks[t]->picture_bytes : 0;
+    pending_bytes += part.expected;
+    if (part.wanted) ++slot.missing;
+  }
+  if (slot.lost && !last_damage) {
+    note_damage({ErrorCode::kNotFound,
+                 "the segment of frame " + std::to_string(slot.index) + " is missing"});
+  }
+  if (slot.missing == 0) changed.notify_all();
+}
+
+void State::free_slot(Slot* slot) {
+  for (Part& part : slot->parts) {
+    ring_bytes -= std::exchange(part.charged, 0);
+    pending_bytes -= std::exchange(part.expected, 0);
+    part.picture.clear();
+  }
+  slot->frame.planes.clear();
+  free_slots.push_back(slot);
+}
+
+/// Takes the first frame out of the ring. What it shares with the next one is charged there.
+void State::detach(std::uint64_t seq) {
+  Slot& slot = at(seq);
+  for (std::size_t t = 0; seq + 1 < tail && t < slot.parts.size(); ++t) {
+    Part& next = at(seq + 1).parts[t];
+    if (!next.shares_previous) continue;
+    next.charged = std::exchange(slot.parts[t].charged, 0);
+    next.shares_previous = false;
+  }
+  if (&slot == shown) {
+    shown_detached = true;
+    return;
+  }
+  if (!slot.good()) {
+    free_slot(&slot);
+    return;
+  }
+  if (fallback != nullptr) free_slot(fallback);
+  fallback = &slot;
+}
+
+void State::release_before(std::uint64_t seq) {
+  while (head < seq) detach(head++);
+  const bool needed = head == tail || !at(head).good();
+  if (!needed && fallback != nullptr) free_slot(std::exchange(fallback, nullptr));
+}
+
+/// Everything that was fetched goes; what is shown stays.
+void State::restart(std::uint64_t index, std::optional<std::uint64_t> tick) {
+  release_before(tail);
+  if (fallback != nullptr) free_slot(std::exchange(fallback, nullptr));
+  ++epoch;
+  ++counts.restarts;
+  start = index;
+  start_tick = tick;
+  error.reset();
+  segments.clear();
+  next_index = std::nullopt;
+  given = false;
+  if (demuxer.interrupt() && demuxer.seekable()) demuxer.interrupt()->raise();
+  wake();
+}
+
+/// Whether going on comes to this frame soon.
+bool State::is_near(std::uint64_t index) const {
+  if (demux_epoch != epoch) return false;
+  if (!next_index || index < *next_index) return false;
+  return index < near_end || demux_lap > admit_lap || !demuxer.seekable();
+}
+
+bool State::ready(const Slot& slot) const {
+  if (slot.missing == 0) return true;
+  if (!impatient || !slot.first || slot.lost || !slot.parts[0].done) return false;
+  bool any = false;
+  int layer = -1;
+  for (std::size_t t = 1; t < slot.parts.size(); ++t) {
+    if (!slot.parts[t].wanted) continue;
+    const int of = tracks[t]->about.layer;
+    if (any && of != layer) break;
+    if (!slot.parts[t].done) return false;
+    any = true;
+    layer = of;
+  }
+  return any;
+}
+
+/// Brings the pictures that have come into the frame's view.
+void State::assemble(Slot& slot) {
+  ClipFrame& frame = slot.frame;
+  const auto& layers = demuxer.layers();
+  if (!slot.laid_out) {
+    std::size_t plane_count = 0;
+    for (const auto& layer : layers) plane_count += layer.planes.size();
+    frame.planes.reset(slot.index, planes ? plane_count : 0, layers.size());
+    slot.laid_out = true;
+  }
+  std::size_t first_plane = 0;
+  std::size_t t = 1;
+  for (std::size_t i = 0; i < layers.size() && t < slot.parts.size(); ++i) {
+    Part& mantissas = slot.parts[t++];
+    Part* exponents = layers[i].has_exponents ? &slot.parts[t++] : nullptr;
+    const bool here = mantissas.wanted && mantissas.done && (!exponents || exponents->done);
+    if (here && !mantissas.taken && !mantissas.picture.empty() &&
+        (!exponents || !exponents->picture.empty())) {
+      mantissas.taken = true;
+      frame.planes.show(layers[i], first_plane, i, mantissas.picture,
+                        exponents ? &exponents->picture : nullptr);
+    }
+    first_plane += layers[i].planes.size();
+  }
+  frame.complete = slot.missing == 0;
+}
+
+/// What is shown for a frame that damage hit: the last good one before it.
+State::Slot* State::stand_in(Slot& slot) {
+  Slot* best = fallback != nullptr ? fallback : shown;
+  for (std::uint64_t seq = head; seq < tail && &at(seq) != &slot; ++seq) {
+    if (at(seq).good()) best = &at(seq);
+  }
+  return best;
+}
+
+}  // namespace relit::player

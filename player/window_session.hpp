@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "gles/device.hpp"
+#include "player/player.hpp"
+#include "player/window.hpp"
+#include "player/window_input.hpp"
+#include "player/window_look.hpp"
+#include "player/window_overlay.hpp"
+
+namespace relit::player {
+
+/// What is played in a window, and what the user has changed about it; knows no window system.
+/// Needs the GL context current for every call, construction and destruction included. One thread.
+class WindowSession {
+ public:
+  using MakeDevice = std::function<Result<std::unique_ptr<gles::Device>>()>;
+
+  /// What only the window can do, since it was asked last.
+  struct Requests {
+    bool quit = false, fullscreen = false, escape = false, screenshot = false;
+  };
+
+  /// Opens the source. `options` is borrowed and outlives this object; `make_device` is called for
+  /// every file that is opened. Errors: the source's, options that make no sense, those of GL.
+  static Result<std::unique_ptr<WindowSession>> create(const WindowOptions& options,
+                                                       MakeDevice make_device);
+
+  /// Does what the user wants. What fails is said in a message.
+  void act(const Action& action);
+  /// Takes a file or address that was dropped: a `.relit` replaces the one that plays, anything
+  /// else is a light. Where that fails everything stays, and a message says why.
+  void drop(const std::string& path);
+
+  /// Brings playback to `now_s` of a monotonic clock. Errors: those of GL, and the source's once
+  /// each.
+  Status update(double now_s);
+  /// There is something to draw that the last draw() did not show.
+  [[nodiscard]] bool changed() const { return changed_; }
+  /// Draws the picture, without overlay, into the framebuffer that is bound.
+  Status draw(int width, int height);
+  /// Shows a message for a while.
+  void say(std::string text, bool is_error = false);
+
+  [[nodiscard]] Requests take_requests() { return std::exchange(requests_, {}); }
+  /// Fills in everything. The controls are shown as far as the model says already, and for a while
+  /// after a seek.
+  void fill(OverlayModel& model, WindowStatistics& statistics) const;
+  /// Whether fill() gives something that changes from picture to picture.
+  [[nodiscard]] bool has_overlay() const;
+  /// How long nothing will change by itself, seconds.
+  [[nodiscard]] double idle_s() const;
+
+  [[nodiscard]] const std::string& title() const { return title_; }
+  [[nodiscard]] PlaybackLoss loss() const { return player_->stats().loss; }
+
+  static constexpr double kControls_s = 1.2;  ///< after a seek
+
+ private:
+  WindowSession(const WindowOptions& options, MakeDevice make_device)
+      : options_(options), make_device_(std::move(make_device)) {}
+
+  struct Light {
+    std::string name;
+    LightField field;
+    std::shared_ptr<const decoders::Environment> environment;  ///< null: none
+    double environment_rotation_rad = 0;
+  };
+  static Result<Light> take_light(LoadedLight light);
+
+  struct Opened {
+    std::unique_ptr<Player> player;
+    std::string title;
+    std::shared_ptr<std::string> why;
+  };
+  Result<Opened> open(const std::string& source, bool as_asked) const;
+  Status start(Player& player, bool as_asked) const;
+  Status use_light(Player& player, const Light& light) const;
+  void use(Opened opened);
+
+  Status change(const Action& action);
+  Status change_light(int way);
+  Status change_clip(int way);
+  Status change_path(int way);
+  Status change_quality(int way);
+  Status change_layers(const Action& action);
+  Status change_speed(double speed);
+  void change_exposure(double stops);
+  void show_controls() { controls_until_s_ = now_s_ + kControls_s; }
+  void move_camera(const Action& action);
+  [[nodiscard]] const container::ClipRecord& clip() const;
+  [[nodiscard]] std::string light_text() const;
+  [[nodiscard]] std::string planes_text() const;
+  [[nodiscard]] double aspect() const;
+
+  const WindowOptions& options_;
+  MakeDevice make_device_;
+  std::unique_ptr<Player> player_;
+  std::string title_;
+  std::shared_ptr<std::string> why_;  ///< the composite path; what the player's log tells
+  std::vector<Light> lights_;
+  std::size_t light_ = 0;
+  double light_turn_rad_ = 0;
+  WindowLook look_;
+  OrbitCamera camera_;
+  double exposure_stops_ = 0;  ///< beyond the look's
+  CompositePath path_ = CompositePath::kAuto;
+  std::optional<double> quality_;
+  int layers_ = -1;
+
+  Requests requests_;
+  bool keys_ = false, statistics_ = false, changed_ = true;
+  int width_ = 1, height_ = 1;
+  double now_s_ = 0;
+  std::optional<double> waiting_since_s_;
+  std::string message_;
+  double message_until_s_ = 0, controls_until_s_ = 0;
+  bool message_is_error_ = false;
+};
+
+}  // namespace relit::player
