@@ -2,6 +2,7 @@
 #include "gles/device.hpp"
 
 #include <cstdio>
+#include <initializer_list>
 
 namespace relit::gles {
 namespace {
@@ -160,9 +161,9 @@ void StateGuard::unbind() const {
 
 void StateGuard::set_defaults() const {
   constexpr GLenum kSampleMask = 0x8E51;
-  for (const GLenum state :
-       {GL_BLEND, GL_DEPTH_TEST, GL_CULL_FACE, GL_SCISSOR_TEST, GL_STENCIL_TEST,
-        GL_POLYGON_OFFSET_FILL, GL_SAMPLE_COVERAGE, GL_SAMPLE_ALPHA_TO_COVERAGE})
+  for (const GLenum state : std::initializer_list<GLenum>{
+           GL_BLEND, GL_DEPTH_TEST, GL_CULL_FACE, GL_SCISSOR_TEST, GL_STENCIL_TEST,
+           GL_POLYGON_OFFSET_FILL, GL_SAMPLE_COVERAGE, GL_SAMPLE_ALPHA_TO_COVERAGE})
     gl_.Disable(state);
   if (device_.is_es3()) gl_.Disable(GL_RASTERIZER_DISCARD);
   const ContextVersion& version = device_.caps().version;
@@ -185,12 +186,13 @@ void StateGuard::set_pixel_store() const {
   gl_.PixelStorei(GL_UNPACK_ALIGNMENT, 4);
   gl_.PixelStorei(GL_PACK_ALIGNMENT, 4);
   if (device_.caps().unpack_row_length || device_.is_es3())
-    for (const GLenum parameter :
-         {GL_UNPACK_ROW_LENGTH, GL_UNPACK_SKIP_ROWS, GL_UNPACK_SKIP_PIXELS})
+    for (const GLenum parameter : std::initializer_list<GLenum>{
+             GL_UNPACK_ROW_LENGTH, GL_UNPACK_SKIP_ROWS, GL_UNPACK_SKIP_PIXELS})
       gl_.PixelStorei(parameter, 0);
   if (!device_.is_es3()) return;
-  for (const GLenum parameter : {GL_UNPACK_IMAGE_HEIGHT, GL_UNPACK_SKIP_IMAGES, GL_PACK_ROW_LENGTH,
-                                 GL_PACK_SKIP_ROWS, GL_PACK_SKIP_PIXELS})
+  for (const GLenum parameter :
+       std::initializer_list<GLenum>{GL_UNPACK_IMAGE_HEIGHT, GL_UNPACK_SKIP_IMAGES,
+                                     GL_PACK_ROW_LENGTH, GL_PACK_SKIP_ROWS, GL_PACK_SKIP_PIXELS})
     gl_.PixelStorei(parameter, 0);
 }
 
