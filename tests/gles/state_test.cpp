@@ -4,6 +4,7 @@
 #include <array>
 #include <cstring>
 #include <functional>
+#include <initializer_list>
 
 #include "gles/character_renderer.hpp"
 #include "gles/compositor.hpp"
@@ -254,15 +255,17 @@ class Host {
     check_value(GL_STENCIL_CLEAR_VALUE, 5);
     check_value(GL_STENCIL_FUNC, GL_NEVER);
     if (!device_.is_es3()) return;
-    for (const GLenum name :
-         {GL_UNPACK_ROW_LENGTH, GL_UNPACK_SKIP_ROWS, GL_UNPACK_SKIP_PIXELS, GL_UNPACK_IMAGE_HEIGHT,
-          GL_UNPACK_SKIP_IMAGES, GL_PACK_ROW_LENGTH, GL_PACK_SKIP_ROWS, GL_PACK_SKIP_PIXELS})
+    for (const GLenum name : std::initializer_list<GLenum>{
+             GL_UNPACK_ROW_LENGTH, GL_UNPACK_SKIP_ROWS, GL_UNPACK_SKIP_PIXELS,
+             GL_UNPACK_IMAGE_HEIGHT, GL_UNPACK_SKIP_IMAGES, GL_PACK_ROW_LENGTH, GL_PACK_SKIP_ROWS,
+             GL_PACK_SKIP_PIXELS})
       check_value(name, 0);
   }
 
   void check_bindings(int units, GLuint framebuffer) {
-    for (const GLenum name : {GL_CURRENT_PROGRAM, GL_ARRAY_BUFFER_BINDING,
-                              GL_ELEMENT_ARRAY_BUFFER_BINDING, GL_RENDERBUFFER_BINDING})
+    for (const GLenum name :
+         std::initializer_list<GLenum>{GL_CURRENT_PROGRAM, GL_ARRAY_BUFFER_BINDING,
+                                       GL_ELEMENT_ARRAY_BUFFER_BINDING, GL_RENDERBUFFER_BINDING})
       check_value(name, 0);
     check_value(GL_ACTIVE_TEXTURE, GL_TEXTURE0);
     check_value(GL_FRAMEBUFFER_BINDING, static_cast<GLint>(framebuffer));
