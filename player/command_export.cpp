@@ -34,7 +34,7 @@ class Export {
       : times_(clip), tracks_(std::move(tracks)), writer_(std::move(writer)) {}
   Status write(const container::ChunkRecord& chunk, std::size_t track);
 
-  FrameTimes times_;
+  ClipTimes times_;
   std::vector<VideoTrack> tracks_;
   MatroskaWriter writer_;
   std::optional<container::SegmentRecord> segment_;

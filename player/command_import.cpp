@@ -87,7 +87,7 @@ class Import {
 
   container::Reader& reader_;
   PacketFeed& feed_;
-  FrameTimes times_;
+  ClipTimes times_;
   std::vector<std::uint32_t> kept_;  ///< tracks whose chunks are copied, sorted
   std::optional<container::SegmentRecord> segment_;
   std::size_t missing_ = 0;  ///< chunks of the segment that are still to be copied

@@ -16,9 +16,9 @@ struct Arguments {
   bool json = false;
 };
 
-std::string text(const std::vector<FrameSpan>& spans) {
+std::string text(const std::vector<FrameRun>& spans) {
   std::string all;
-  for (const FrameSpan& s : spans) {
+  for (const FrameRun& s : spans) {
     if (!all.empty()) all += ", ";
     all += std::to_string(s.first);
     if (s.last != s.first) all += "-" + std::to_string(s.last);
@@ -30,7 +30,7 @@ ordered_json to_json(const RecoverReport& report) {
   ordered_json tracks = ordered_json::array();
   for (const TrackLoss& t : report.tracks) {
     ordered_json frames = ordered_json::array();
-    for (const FrameSpan& s : t.frames) frames.push_back({s.first, s.last});
+    for (const FrameRun& s : t.frames) frames.push_back({s.first, s.last});
     tracks.push_back({{"clip", t.clip_id},
                       {"clip_name", t.clip},
                       {"track", t.track},

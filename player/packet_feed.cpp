@@ -42,7 +42,7 @@ Result<bool> PacketFeed::wait_for(std::size_t track) {
   return true;
 }
 
-Status PacketFeed::append(const FrameTimes& times, const MatroskaPacket& packet,
+Status PacketFeed::append(const ClipTimes& times, const MatroskaPacket& packet,
                           container::ChunkRecord& chunk) const {
   const auto frame = times.frame_near(packet.time_ns, resolution_ns());
   if (!frame) return wrong(packet, "no frame of its segment begins then");
@@ -66,7 +66,7 @@ Status PacketFeed::append(const FrameTimes& times, const MatroskaPacket& packet,
 }
 
 Result<container::ChunkRecord> PacketFeed::chunk(const container::SegmentRecord& segment,
-                                                 std::size_t track, const FrameTimes& times) {
+                                                 std::size_t track, const ClipTimes& times) {
   container::ChunkRecord chunk;
   chunk.track_id = tracks()[track].track_id;
   for (;;) {

@@ -29,7 +29,7 @@ class PacketFeed {
   /// that are not of the form that the codec's packets have; kLimit when other tracks' packets come
   /// so much earlier that they fill the memory; those of MatroskaReader.
   Result<container::ChunkRecord> chunk(const container::SegmentRecord& segment, std::size_t track,
-                                       const FrameTimes& times);
+                                       const ClipTimes& times);
 
   /// Whether all packets have been taken. Errors: kCorrupt, naming what is left.
   Status finish();
@@ -37,7 +37,7 @@ class PacketFeed {
  private:
   /// Reads until the track has a packet waiting; false at the end of the file.
   Result<bool> wait_for(std::size_t track);
-  Status append(const FrameTimes& times, const MatroskaPacket& packet,
+  Status append(const ClipTimes& times, const MatroskaPacket& packet,
                 container::ChunkRecord& chunk) const;
   [[nodiscard]] Unexpected wrong(const MatroskaPacket& packet, const std::string& what) const;
 

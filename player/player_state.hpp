@@ -103,6 +103,8 @@ struct Player::State final : FrameTimes {
   bool sequence_loops = false;
   unsigned program = 0;  ///< counts what was begun to be played
 
+  std::unique_ptr<gles::Device> device;  ///< destroyed after voices and character, which use it
+
   // Voices by role, and whose the primary is. The mutex is for cancel(), which comes from anywhere.
   std::mutex roles;
   std::unique_ptr<ClipVoice> primary, secondary;
@@ -137,7 +139,6 @@ struct Player::State final : FrameTimes {
   bool seeking = true;  ///< frames passed over were not due
   std::atomic<bool> cancelled{false};
 
-  std::unique_ptr<gles::Device> device;  ///< destroyed after what uses it
   std::unique_ptr<Character> character;
   std::optional<Backdrop> backdrop;  ///< that the renderer has; none: none yet
   unsigned backdrop_light = 0;       ///< PlayerLight::generation() that it was made of

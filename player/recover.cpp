@@ -35,17 +35,17 @@ struct Gathered {
 
 /// The frames of a track that are in the output.
 struct Coverage {
-  std::vector<FrameSpan> spans;  ///< rising, joined where they touch
+  std::vector<FrameRun> spans;  ///< rising, joined where they touch
   void add(std::uint64_t first, std::uint64_t last) {
     if (!spans.empty() && spans.back().last + 1 == first)
       spans.back().last = last;
     else
       spans.push_back({first, last});
   }
-  [[nodiscard]] std::vector<FrameSpan> missing(std::uint64_t frames) const {
-    std::vector<FrameSpan> gaps;
+  [[nodiscard]] std::vector<FrameRun> missing(std::uint64_t frames) const {
+    std::vector<FrameRun> gaps;
     std::uint64_t next = 0;
-    for (const FrameSpan& s : spans) {
+    for (const FrameRun& s : spans) {
       if (s.first > next) gaps.push_back({next, s.first - 1});
       next = s.last + 1;
     }

@@ -12,9 +12,9 @@
 namespace relit::player {
 
 /// Frames of a clip, first to last.
-struct FrameSpan {
+struct FrameRun {
   std::uint64_t first = 0, last = 0;
-  bool operator==(const FrameSpan&) const = default;
+  bool operator==(const FrameRun&) const = default;
 };
 
 /// What a recovered file lacks of one track.
@@ -23,7 +23,7 @@ struct TrackLoss {
   std::string clip;  ///< its name
   std::uint32_t track = 0;
   std::string what;  ///< "pose", "layer 3", "exponents of layer 3"
-  std::vector<FrameSpan> frames;
+  std::vector<FrameRun> frames;
 };
 
 /// What recover() did.

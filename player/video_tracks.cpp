@@ -68,7 +68,7 @@ Result<const container::ClipRecord*> find_clip(const container::FileContents& co
   return fail(ErrorCode::kNotFound, file + ": no clip \"" + wanted + "\"; there are: " + names);
 }
 
-Status FrameTimes::begin(const container::SegmentRecord& segment, std::int64_t resolution_ns) {
+Status ClipTimes::begin(const container::SegmentRecord& segment, std::int64_t resolution_ns) {
   // Ticks and both parts of the rate stay below 2^32: av_rescale() computes in 128 bits.
   const auto time = [&](std::uint64_t tick) {
     return av_rescale(static_cast<std::int64_t>(tick), clip_.tick_rate.den * 1'000'000'000,
@@ -90,8 +90,8 @@ Status FrameTimes::begin(const container::SegmentRecord& segment, std::int64_t r
   return {};
 }
 
-std::optional<std::uint64_t> FrameTimes::frame_near(std::int64_t time_ns,
-                                                    std::int64_t tolerance_ns) const {
+std::optional<std::uint64_t> ClipTimes::frame_near(std::int64_t time_ns,
+                                                   std::int64_t tolerance_ns) const {
   const auto begin = times_.begin(), end = times_.end() - 1;
   auto nearest = std::lower_bound(begin, end, time_ns);
   if (nearest == end || (nearest != begin && time_ns - nearest[-1] <= *nearest - time_ns))

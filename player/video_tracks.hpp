@@ -30,9 +30,9 @@ struct VideoTrack {
     const container::FileContents& contents, const std::string& wanted, const std::string& file);
 
 /// When the frames of a clip are shown, segment by segment.
-class FrameTimes {
+class ClipTimes {
  public:
-  explicit FrameTimes(container::ClipRecord clip) : clip_(std::move(clip)) {}
+  explicit ClipTimes(container::ClipRecord clip) : clip_(std::move(clip)) {}
   [[nodiscard]] const container::ClipRecord& clip() const { return clip_; }
 
   /// Takes a segment of the clip. Errors: kUnsupported when one of its frames is shown for less

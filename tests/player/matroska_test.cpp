@@ -94,7 +94,7 @@ Sent mpeg4_track(const VideoClip& made) {
   Sent sent;
   const container::LayerRecord& layer = made.layers[1];
   sent.stream = {3, "mpeg4", "mpeg4", layer.codec_private, layer.coded_width, layer.coded_height};
-  FrameTimes times(made.clip);
+  ClipTimes times(made.clip);
   for (std::size_t s = 0; s < made.segments.size(); ++s) {
     REQUIRE(times.begin(made.segments[s], 1));
     const container::ChunkRecord& chunk = made.chunks[s][2];
@@ -270,7 +270,7 @@ TEST_CASE("every truncation of a Matroska file is refused") {
   write_file(folder.file("a.relit"), made.file());
   write_matroska(folder.file("m.mkv"), mpeg4_track(made));
   const std::vector<std::uint8_t> whole = read_bytes(folder.file("m.mkv"));
-  FrameTimes times(made.clip);
+  ClipTimes times(made.clip);
   for (std::size_t size = 0; size + 400 < whole.size(); size += 37) {
     INFO(size);
     write_file(folder.file("cut.mkv"),
@@ -334,7 +334,7 @@ TEST_CASE("rounded times find their frames") {
     clip.tick_rate = {rate * 1000, 1001};
     if (rate == 1000) clip.tick_rate = {1000, 1};
     clip.frame_count = clip.duration_ticks = 40000;
-    FrameTimes times(clip);
+    ClipTimes times(clip);
     container::SegmentRecord segment;
     segment.first_frame = segment.first_tick = 13;
     segment.frame_count = 30000;

@@ -290,10 +290,10 @@ TEST_CASE("recover drops a damaged chunk alone, or with its segment where nothin
     CHECK((kept != nullptr) == (i >= 2));
     if (kept != nullptr) CHECK(kept->chunks.size() + 1 == second.chunks.size());
     CHECK(after.segments.size() == before.segments.size() - (i < 2 ? 1 : 0));
-    const FrameSpan span{second.segment.first_frame,
-                         second.segment.first_frame + second.segment.frame_count - 1};
+    const FrameRun span{second.segment.first_frame,
+                        second.segment.first_frame + second.segment.frame_count - 1};
     for (const TrackLoss& track : result.report.tracks)
-      CHECK(track.frames == std::vector<FrameSpan>{span});
+      CHECK(track.frames == std::vector<FrameRun>{span});
     CHECK(result.report.tracks.size() == (i < 2 ? second.chunks.size() : 1));
     at += second.segment.chunks[i].chunk_bytes;
   }

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstdio>
+#include <deque>
 #include <random>
 
 #include "gles/picture.hpp"
@@ -96,7 +97,7 @@ class Clip {
     layer.bit_depth = 8;
     layer.planes.push_back(plane);
   }
-  std::vector<std::vector<std::uint8_t>> pictures_;
+  std::deque<std::vector<std::uint8_t>> pictures_;  // views point into them
 };
 
 decoders::Light test_light(double turn = 0) {
