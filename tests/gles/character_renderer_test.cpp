@@ -8,6 +8,7 @@
 #include "gles/compositor.hpp"
 #include "tests/gles/backends.hpp"
 #include "tests/gles/drawing.hpp"
+#include "tests/results.hpp"
 #include "tests/test.hpp"
 
 namespace {
@@ -26,15 +27,6 @@ struct Stage {
         framebuffer(take(Framebuffer::create(d, {kSide, kSide, samples}))),
         renderer(take(CharacterRenderer::create(d))) {
     light(constant_light(light_side, light_side, {1, 1, 1}), 1);
-  }
-
-  template <class T>
-  static T take(Result<T> result) {
-    if (!result) FAIL(result.error().message);
-    return std::move(*result);
-  }
-  static void require(const Status& status) {
-    if (!status) FAIL(status.error().message);
   }
 
   void light(const std::vector<float>& values, float magnitude) {
@@ -370,7 +362,7 @@ TEST_CASE("a view draws only within its rectangle, and state is put back", "[gle
     Background white;
     white.kind = Background::Kind::kColor;
     white.top = {1, 1, 1};
-    Stage::require(stage.renderer->background().set(white));
+    require(stage.renderer->background().set(white));
     stage.materials({MaterialView{}});
     stage.meshes({&quad});
     stage.light(constant_light(4, 4, {1, 0, 0}), 1);
@@ -386,7 +378,7 @@ TEST_CASE("a view draws only within its rectangle, and state is put back", "[gle
     view.y = 4;
     view.width = 16;
     view.height = 8;
-    Stage::require(stage.renderer->draw(view, stage.map));
+    require(stage.renderer->draw(view, stage.map));
     GLint after = 0;
     GLint viewport[4] = {};
     gl.GetIntegerv(GL_FRAMEBUFFER_BINDING, &after);
@@ -403,9 +395,9 @@ TEST_CASE("a view draws only within its rectangle, and state is put back", "[gle
     }
     constexpr GLenum kSwitches[] = {GL_BLEND, GL_DEPTH_TEST, GL_CULL_FACE, GL_SCISSOR_TEST};
     for (const GLenum name : kSwitches) CHECK(gl.IsEnabled(name) == GLboolean{GL_FALSE});
-    Stage::require(stage.framebuffer.resolve());
+    require(stage.framebuffer.resolve());
     Picture picture{kSide, kSide, std::vector<std::uint8_t>(4 * kSide * kSide)};
-    Stage::require(stage.framebuffer.read_back(picture.rgba));
+    require(stage.framebuffer.read_back(picture.rgba));
     int red = 0, black = 0;
     for (int i = 0; i < kSide * kSide; ++i) {
       const std::array<int, 4> p = picture.at(i % kSide, i / kSide);
@@ -437,10 +429,10 @@ TEST_CASE("a light map from the GPU is drawn as its composite", "[gles][es2]") {
       description.width = description.height = 8;
       description.planes.resize(1);
       description.format = format;
-      auto compositor = Stage::take(Compositor::create(device, description));
-      Stage::require(compositor->upload(std::span(&plane, 1)));
+      auto compositor = take(Compositor::create(device, description));
+      require(compositor->upload(std::span(&plane, 1)));
       Stage stage(device);
-      stage.map = Stage::take(compositor->composite(folded));
+      stage.map = take(compositor->composite(folded));
       stage.materials({MaterialView{}});
       stage.meshes({&quad});
       const Picture picture = stage.draw();

@@ -8,6 +8,7 @@
 #include "tests/gles/backends.hpp"
 #include "tests/gles/drawing.hpp"
 #include "tests/gles/plane_scene.hpp"
+#include "tests/results.hpp"
 #include "tests/test.hpp"
 
 namespace {
@@ -17,16 +18,6 @@ using namespace relit::gles;
 using namespace relit::test;
 
 constexpr int kSide = 96;
-
-template <class T>
-T take(Result<T> result) {
-  if (!result) FAIL(result.error().message);
-  return std::move(*result);
-}
-
-void require(const Status& status) {
-  if (!status) FAIL(status.error().message);
-}
 
 // Values between 0.25 and 0.95, so that the sRGB curve is nowhere steep: 0.6 and terms that sum to
 // 0.35 at most.

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "tests/gles/backends.hpp"
+#include "tests/results.hpp"
 #include "tests/test.hpp"
 
 namespace {
@@ -11,12 +12,6 @@ namespace {
 using namespace relit;
 using namespace relit::gles;
 using namespace relit::test;
-
-template <class T>
-T take(Result<T> result) {
-  if (!result) FAIL(result.error().message);
-  return std::move(*result);
-}
 
 // [3][side][side], linear in x and y: what bilinear filtering reproduces.
 std::vector<float> ramp(int side, float base, float slope) {

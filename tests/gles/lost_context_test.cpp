@@ -10,6 +10,7 @@
 #include "tests/gles/backends.hpp"
 #include "tests/gles/drawing.hpp"
 #include "tests/gles/plane_scene.hpp"
+#include "tests/results.hpp"
 #include "tests/test.hpp"
 
 namespace {
@@ -17,15 +18,6 @@ namespace {
 using namespace relit;
 using namespace relit::gles;
 using namespace relit::test;
-
-template <class T>
-T take(Result<T> result) {
-  if (!result) FAIL(result.error().message);
-  return std::move(*result);
-}
-void require(const Status& status) {
-  if (!status) FAIL(status.error().message);
-}
 
 // One of everything, on a device of its own.
 struct Objects {

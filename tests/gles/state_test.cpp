@@ -14,6 +14,7 @@
 #include "tests/gles/backends.hpp"
 #include "tests/gles/drawing.hpp"
 #include "tests/gles/plane_scene.hpp"
+#include "tests/results.hpp"
 #include "tests/test.hpp"
 
 namespace {
@@ -24,15 +25,6 @@ using namespace relit::test;
 
 constexpr int kSide = 32;
 constexpr int kUnits = 8;
-
-template <class T>
-T take(Result<T> result) {
-  if (!result) FAIL(result.error().message);
-  return std::move(*result);
-}
-void require(const Status& status) {
-  if (!status) FAIL(status.error().message);
-}
 
 // Entry points that only a host calls.
 struct HostFunctions {

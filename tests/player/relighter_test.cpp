@@ -10,6 +10,7 @@
 #include "tests/gles/backends.hpp"
 #include "tests/gles/drawing.hpp"
 #include "tests/reference/composite_reference.hpp"
+#include "tests/results.hpp"
 #include "tests/test.hpp"
 
 namespace relit::player {
@@ -17,17 +18,10 @@ namespace {
 
 using decoders::FrameView;
 using relit::test::on_each_backend;
+using relit::test::require;
+using relit::test::take;
 
 constexpr int kWidth = 40, kHeight = 24;
-
-template <class T>
-T take(Result<T> result) {
-  if (!result) FAIL(result.error().message);
-  return std::move(*result);
-}
-void require(const Status& status) {
-  if (!status) FAIL(status.error().message);
-}
 
 /// An order-1 model in three layers: constant in colour, one plane for each band-1 coefficient in
 /// 4:2:0 pictures with exponents, and one faint plane; as decoders leave them, in pictures.
