@@ -15,26 +15,9 @@ double luminance(const std::array<double, 3>& rgb) {
 }
 
 // The exposure under which a white surface in the mean of the light comes out a little below white.
-Result<float> choose_exposure(const std::string& text, const decoders::Light& light) {
-  if (text == "auto") {
-    const double mean = luminance(light.sh.front()) * decoders::kBand0;
-    return mean > 0 ? static_cast<float>(0.8 / mean) : 1.0f;
-  }
-  double stops = 0;
-  const auto [rest, error] = std::from_chars(text.data(), text.data() + text.size(), stops);
-  if (error != std::errc() || rest != text.data() + text.size() || !(std::abs(stops) <= 60)) {
-    return fail(
-        ErrorCode::kInvalid,
-        "--exposure " + text + ": it must be auto, or stops such as -1.5 (radiance × 2^stops)");
-  }
-  return static_cast<float>(std::exp2(stops));
-}
-
-Result<gles::ToneMap> parse_tone_map(const std::string& text) {
-  if (text == "linear") return gles::ToneMap::kLinear;
-  if (text == "filmic") return gles::ToneMap::kFilmic;
-  if (text == "neutral") return gles::ToneMap::kNeutral;
-  return fail(ErrorCode::kInvalid, "--tone-map " + text + ": it must be neutral, filmic or linear");
+float auto_exposure(const decoders::Light& light) {
+  const double mean = luminance(light.sh.front()) * decoders::kBand0;
+  return mean > 0 ? static_cast<float>(0.8 / mean) : 1.0f;
 }
 
 // The area that the box from `low` to `high` takes in the picture, as a rectangle.
@@ -60,6 +43,25 @@ bool is_color(const std::string& text) {
 }
 
 }  // namespace
+
+Result<std::optional<double>> parse_exposure(const std::string& text) {
+  if (text == "auto") return std::optional<double>();
+  double stops = 0;
+  const char* end = text.data() + text.size();
+  const auto [rest, error] = std::from_chars(text.data(), end, stops);
+  if (error == std::errc() && rest == end && std::abs(stops) <= 60)
+    return std::optional<double>(stops);
+  return fail(
+      ErrorCode::kInvalid,
+      "--exposure " + text + ": it must be auto, or stops such as -1.5 (radiance × 2^stops)");
+}
+
+Result<gles::ToneMap> parse_tone_map(const std::string& text) {
+  if (text == "linear") return gles::ToneMap::kLinear;
+  if (text == "filmic") return gles::ToneMap::kFilmic;
+  if (text == "neutral") return gles::ToneMap::kNeutral;
+  return fail(ErrorCode::kInvalid, "--tone-map " + text + ": it must be neutral, filmic or linear");
+}
 
 std::vector<std::uint8_t> decoded_layers(const ClipReader& clip, int layers) {
   std::vector<std::uint8_t> decoded(clip.layers().size(), 1);
@@ -87,29 +89,16 @@ Result<std::unique_ptr<SceneView>> SceneView::create(const ClipReader& clip,
   return scene;
 }
 
-void SceneView::scale_exposure(float factor) {
-  view_.exposure *= factor;
-  relighter_->set_exposure(view_.exposure);
-}
-
 Status SceneView::fold(const decoders::Light& light) {
   return relighter_->set_light(light, decoded_layers(clip_, options_.layers));
 }
 
 Status SceneView::set_light(const LoadedLight& light) {
-  RELIT_ASSIGN(view_.exposure, choose_exposure(options_.exposure, light.light));
+  RELIT_ASSIGN(const std::optional<double> stops, parse_exposure(options_.exposure));
+  view_.exposure = stops ? static_cast<float>(std::exp2(*stops)) : auto_exposure(light.light);
   relighter_->set_exposure(view_.exposure);
   RELIT_TRY(fold(light.light));
   return set_background(light);
-}
-
-Status SceneView::turn_light(const LoadedLight& light, double turn_rad) {
-  decoders::Light turned = light.light;
-  decoders::rotate_light_y(turned, turn_rad);
-  RELIT_TRY(fold(turned));
-  character_->renderer().background().set_rotation(
-      static_cast<float>(light.environment_rotation_rad + turn_rad));
-  return {};
 }
 
 Status SceneView::vary_light(const decoders::Light& light) {

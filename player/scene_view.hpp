@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,11 @@ struct ViewOptions {
   CompositePath composite = CompositePath::kTexture;
 };
 
+/// Of ViewOptions::exposure: stops; none for "auto". Errors: kInvalid.
+[[nodiscard]] Result<std::optional<double>> parse_exposure(const std::string& text);
+/// Of ViewOptions::tone_map. Errors: kInvalid.
+[[nodiscard]] Result<gles::ToneMap> parse_tone_map(const std::string& text);
+
 /// A clip in a GL context, under a light, from a camera: what `relit render` and `relit play`
 /// share.
 class SceneView {
@@ -36,9 +42,6 @@ class SceneView {
 
   /// Takes a light, and its picture as the background. Errors: kInvalid, those of GL.
   Status set_light(const LoadedLight& light);
-  /// Takes only a turned light: `light` and its background are `turn_rad` further about +Y than
-  /// set_light()'s.
-  Status turn_light(const LoadedLight& light, double turn_rad);
   /// Takes what the light that set_light() took has become at a time and place; it has no picture.
   /// The exposure stays.
   Status vary_light(const decoders::Light& light);
@@ -47,8 +50,6 @@ class SceneView {
   Status set_frame(const ClipFrame& frame);
   /// Draws into the framebuffer that is bound, over all of its width × height pixels.
   Status draw(const OrbitCamera& camera, int width, int height);
-  /// Multiplies the exposure.
-  void scale_exposure(float factor);
 
   [[nodiscard]] const Relighter& relighter() const { return *relighter_; }
 

@@ -2,23 +2,10 @@
 #include "player/window_look.hpp"
 
 #include <charconv>
-#include <cmath>
 #include <glm/glm.hpp>
 
 namespace relit::player {
 namespace {
-
-Result<std::optional<double>> parse_exposure(const std::string& text) {
-  if (text == "auto") return std::optional<double>();
-  double stops = 0;
-  const char* end = text.data() + text.size();
-  const auto [rest, error] = std::from_chars(text.data(), end, stops);
-  if (error == std::errc() && rest == end && std::abs(stops) <= 60)
-    return std::optional<double>(stops);
-  return fail(
-      ErrorCode::kInvalid,
-      "--exposure " + text + ": it must be auto, or stops such as -1.5 (radiance × 2^stops)");
-}
 
 Result<Backdrop> parse_background(const std::string& text) {
   Backdrop backdrop;
@@ -54,14 +41,7 @@ Result<WindowLook> parse_look(const ViewOptions& options) {
   RELIT_ASSIGN(look.exposure_stops, parse_exposure(options.exposure));
   RELIT_ASSIGN(look.backdrop, parse_background(options.background));
   look.backdrop.blur_rad = static_cast<float>(glm::radians(options.background_blur_deg));
-  if (options.tone_map == "linear") {
-    look.tone_map = gles::ToneMap::kLinear;
-  } else if (options.tone_map == "filmic") {
-    look.tone_map = gles::ToneMap::kFilmic;
-  } else if (options.tone_map != "neutral") {
-    return fail(ErrorCode::kInvalid,
-                "--tone-map " + options.tone_map + ": it must be neutral, filmic or linear");
-  }
+  RELIT_ASSIGN(look.tone_map, parse_tone_map(options.tone_map));
   return look;
 }
 
