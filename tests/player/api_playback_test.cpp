@@ -6,6 +6,7 @@
 
 #include "player/remux.hpp"
 #include "tests/player/api_fixture.hpp"
+#include "tests/player/damage.hpp"
 
 using namespace relit;
 using namespace relit::player;
@@ -149,6 +150,32 @@ TEST_CASE("api: seeking beyond the ends shows the last and the first frame") {
   CHECK(waited(player).frame == clip.frame_count - 1);
   REQUIRE(relit_step(player, 2) == RELIT_OK);
   CHECK(waited(player).frame == 1);
+}
+
+TEST_CASE(
+    "api: seeking into a damaged segment keeps the picture, and out of it shows the right one") {
+  std::vector<std::uint8_t> file = mannequin();
+  const Read read = read_all(file);
+  REQUIRE(read.segments.size() >= 3);
+  const PlacedSegment& hurt = read.segments[1];
+  std::mt19937 random(7);
+  damage(file, {(hurt.begin + hurt.end) / 2, hurt.end - 100}, random);
+  const std::uint64_t inside = hurt.segment.first_frame + 3;
+  const std::uint64_t behind = read.segments[2].segment.first_frame;
+  const ApiPlayer whole(mannequin()), player(file);
+  REQUIRE(player.result == RELIT_OK);
+  REQUIRE(relit_set_paused(player, 1) == RELIT_OK);
+  waited(player);
+  const std::vector<float> first = light_map(player);
+  REQUIRE(relit_seek_frame(player, inside) == RELIT_OK);
+  waited(player);
+  CHECK(light_map(player) == first);
+  CHECK(statistics_of(player).lost_frames > 0);
+  REQUIRE(relit_seek_frame(player, behind) == RELIT_OK);
+  waited(player);
+  REQUIRE(relit_seek_frame(whole, behind) == RELIT_OK);
+  waited(whole);
+  CHECK(light_map(player) == light_map(whole));
 }
 
 TEST_CASE("api: frames of unequal length are found by time") {
@@ -327,6 +354,26 @@ TEST_CASE("api: statistics add up") {
   CHECK(s.planes > 0);
   CHECK(s.path == RELIT_PATH_CPU);
   CHECK(s.threads >= 1);
+}
+
+TEST_CASE("api: planes that a low quality left out come back with a high one") {
+  const ApiPlayer player(mannequin());
+  REQUIRE(player.result == RELIT_OK);
+  REQUIRE(relit_set_paused(player, 1) == RELIT_OK);
+  moment_of(player, 0);
+  waited(player);
+  const std::vector<float> all = light_map(player);
+  REQUIRE(relit_set_quality(player, 0) == RELIT_OK);
+  // So long that what the quality does not need is fetched no more.
+  for (int i = 0; i < 200; ++i) moment_of(player, i * 20 * kMs);
+  REQUIRE(relit_seek_frame(player, 1) == RELIT_OK);
+  waited(player);
+  CHECK(light_map(player) != all);
+  REQUIRE(relit_set_quality(player, 1) == RELIT_OK);
+  REQUIRE(relit_turn_light(player, 0) == RELIT_OK);
+  REQUIRE(relit_seek_frame(player, 0) == RELIT_OK);
+  waited(player);
+  CHECK(light_map(player) == all);
 }
 
 TEST_CASE("api: a source that stalls holds up neither updates nor closing") {
