@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -85,6 +86,27 @@ class Composite {
   std::vector<float> out_;
 };
 
+/// How long after their time frames were there to be shown, composited if that was asked for.
+class Lateness {
+ public:
+  explicit Lateness(std::size_t frames) { ms_.reserve(frames); }
+  void add(Clock::duration late) {
+    ms_.push_back(std::chrono::duration<float, std::milli>(late).count());
+  }
+  [[nodiscard]] nlohmann::json json() const {
+    if (ms_.empty()) return nullptr;
+    std::vector<float> sorted = ms_;
+    std::sort(sorted.begin(), sorted.end());
+    const auto at = [&](double share) {
+      return sorted[static_cast<std::size_t>(share * static_cast<double>(sorted.size() - 1))];
+    };
+    return {{"median", at(0.5)}, {"99%", at(0.99)}, {"99.9%", at(0.999)}, {"most", at(1)}};
+  }
+
+ private:
+  std::vector<float> ms_;
+};
+
 class Stream {
  public:
   static Result<Stream> open(const Arguments& arguments);
@@ -97,7 +119,7 @@ class Stream {
  private:
   explicit Stream(const Arguments& arguments) : arguments_(arguments) {}
   Status show(std::uint64_t index);
-  Status show_in_time(std::uint64_t index, Clock::time_point due);
+  Status show_in_time(std::uint64_t index, Clock::time_point due, Clock::duration lasts);
   void observe();
   [[nodiscard]] Clock::duration ticks(std::uint64_t count) const;
   [[nodiscard]] bool over() const {
@@ -109,6 +131,7 @@ class Stream {
   std::unique_ptr<Prefetcher> clip_;
   std::optional<Composite> composite_;
   BufferLevels levels_;
+  Lateness lateness_{1 << 16};
   double progress_s_ = 0;
   double open_s_ = 0, first_s_ = 0, play_s_ = 0;
   std::uint64_t frames_ = 0, late_ = 0, dropped_ = 0;
@@ -169,10 +192,16 @@ Status Stream::show(std::uint64_t index) {
   return {};
 }
 
-Status Stream::show_in_time(std::uint64_t index, Clock::time_point due) {
+// A frame is late where it is not decoded when its time comes, and where it is not ready to be seen
+// before its time is over.
+Status Stream::show_in_time(std::uint64_t index, Clock::time_point due, Clock::duration lasts) {
   std::this_thread::sleep_until(due);
-  if (clip_->frame(index) == nullptr) ++late_;
-  return show(index);
+  const bool here = clip_->frame(index) != nullptr;
+  RELIT_TRY(show(index));
+  const Clock::duration after = Clock::now() - due;
+  lateness_.add(after);
+  if (!here || after > lasts) ++late_;
+  return {};
 }
 
 Status Stream::play() {
@@ -191,7 +220,7 @@ Status Stream::play() {
         continue;
       }
       clip_->want(k);
-      RELIT_TRY(due ? show_in_time(k, *due) : show(k));
+      RELIT_TRY(due ? show_in_time(k, *due, lasts) : show(k));
       if (arguments_.realtime && !due) due = Clock::now();
       if (due) *due += lasts;
     }
@@ -267,6 +296,7 @@ void Stream::print_json() const {
                              {"ring_bytes", level.ring_bytes},
                              {"packet_bytes", level.packet_bytes}});
   }
+  if (arguments_.realtime) out["lateness_ms"] = lateness_.json();
   out["notes"] = stats.notes;
   std::printf("%s\n", out.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
 }
