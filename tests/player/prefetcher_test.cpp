@@ -364,6 +364,8 @@ TEST_CASE("segments that are decoded side by side give the frames that a ClipRea
       }
     }
     CHECK(prefetcher->stats().restarts == 0);
+    // What stands in for a lost frame depends on what was shown before.
+    if (prefetcher->loss().any()) continue;
     std::mt19937 random(11);
     for (int i = 0; i < 20; ++i) {
       const auto k = random() % (expected.size() - 1);
@@ -407,8 +409,16 @@ TEST_CASE("until playback moves on from its first picture no more is decoded") {
   for (int i = 0; i < 6000 && prefetcher->stats().decoded_frames < 8; ++i)
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   CHECK(prefetcher->stats().decoded_frames >= 8);
+  // A jump is a beginning.
   prefetcher->want(60);
   REQUIRE(prefetcher->wait(60, kPatience_s));
+  prefetcher->want(10);
+  CHECK(prefetcher->stats().restarts > 0);
+  REQUIRE(prefetcher->wait(10, kPatience_s));
   const auto after = prefetcher->stats().decoded_frames;
   CHECK(settled() - after <= 1);
+  prefetcher->fetch_ahead();
+  for (int i = 0; i < 6000 && prefetcher->stats().decoded_frames < after + 8; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  CHECK(prefetcher->stats().decoded_frames >= after + 8);
 }
