@@ -219,7 +219,8 @@ TEST_CASE("standard input plays forward") {
 TEST_CASE("stream keeps to a memory budget, or is refused with the one that would do") {
   const Folder folder;
   const std::string clip = shipped_clip().string();
-  const std::string composite = " --sink composite --light " + shipped_light().string();
+  std::ofstream(folder.file("light.json")) << R"({"sh": [[1, 1, 1]]})";
+  const std::string composite = " --sink composite --light " + folder.file("light.json");
   std::string says;
   REQUIRE(run_relit("stream " + clip + composite + " --memory-budget 12MiB --fill --json", &says) ==
           0);
@@ -235,7 +236,7 @@ TEST_CASE("stream keeps to a memory budget, or is refused with the one that woul
   CHECK(planned["heap_bytes"] == plan["heap_bytes"]);
   CHECK(planned["ring"]["frames"] == plan["ring_frames"]);
 
-  CHECK(run_relit("stream " + clip + composite + " --memory-budget 1MiB", &says) == 1);
+  CHECK(run_relit("stream " + clip + composite + " --memory-budget 1MiB", &says) == 2);
   CHECK(says.find("needs at least") != std::string::npos);
   CHECK(run_relit("stream " + clip + " --memory-budget 12MiB --ring 8MiB") == 2);
   CHECK(run_relit("stream " + clip + " --memory-budget much") == 2);
