@@ -23,7 +23,7 @@ using namespace relit::container;
 using namespace relit::fuzz;
 
 constexpr unsigned kMostEdits = 8;
-constexpr std::uint64_t kMostFrames = 8;
+constexpr std::uint64_t kFramesTried = 8;
 
 template <class Values>
 auto* pick(Values& values, unsigned at) {
@@ -232,7 +232,7 @@ void decode_planes(const FileContents& file, const ModelRecord& model, const Seg
   auto decoder = decoders::PlaneDecoder::open(model, layers);
   if (!said(decoder)) return;
   for (const auto& [segment, chunk] : segments.chunks) said(decoder->add_chunk(segment, chunk));
-  for (std::uint64_t i = 0; i < kMostFrames; ++i) said(decoder->frame(i * 5 % kMostFrames));
+  for (std::uint64_t i = 0; i < kFramesTried; ++i) said(decoder->frame(i * 5 % kFramesTried));
   decoder->forget_before(2);
   const auto view = decoder->frame(1);
   if (!said(view)) return;
@@ -260,7 +260,7 @@ void replace_chunks(const FileContents& file, const Segments& segments) {
       if (chunk.track_id != layer.mantissa_track) continue;
       if (!said(track->replace_chunk(segment, chunk))) continue;
       require(track->has_segment_of(segment.first_frame));
-      for (std::uint64_t i = 0; i < std::min<std::uint64_t>(segment.frame_count, kMostFrames); ++i)
+      for (std::uint64_t i = 0; i < std::min<std::uint64_t>(segment.frame_count, kFramesTried); ++i)
         show(layer, track->picture(segment.first_frame + i));
     }
   }
