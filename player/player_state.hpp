@@ -84,7 +84,8 @@ struct Player::State final : FrameTimes {
   void use_exposure(float exposure);
   Status freshen();
   Status draw(const gles::View& view, const Backdrop& wanted);
-  Status measure_paths(const gles::View& view);
+  [[nodiscard]] bool wants_measuring(const gles::View& view);
+  Status measure_path(const gles::View& view);
   [[nodiscard]] double covered_pixels(const gles::View& view) const;
   [[nodiscard]] PlayerStats stats() const;
 

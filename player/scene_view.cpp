@@ -155,8 +155,11 @@ Status SceneView::draw(const OrbitCamera& camera, int width, int height) {
   view_.width = width, view_.height = height;
   gles::CharacterRenderer& renderer = character_->renderer();
   const double covered = covered_pixels(view_, low, high);
-  if (frame_ != nullptr && relighter_->wants_measuring(covered))
-    RELIT_TRY(relighter_->measure({&frame_->planes}, renderer, view_));
+  if (frame_ != nullptr && relighter_->wants_measuring(covered)) {
+    for (bool chosen = false; !chosen;) {
+      RELIT_ASSIGN(chosen, relighter_->measure({&frame_->planes}, renderer, view_));
+    }
+  }
   return relighter_->draw(renderer, view_);
 }
 
