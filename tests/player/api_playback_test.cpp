@@ -283,6 +283,52 @@ TEST_CASE("api: a sequence plays clip after clip") {
   CHECK(at(2 * second_s + first_s).ended == 1);
 }
 
+TEST_CASE("api: a sequence keeps to the budget, or is refused and nothing changes") {
+  // What one clip takes, and two, of one thread each.
+  const auto planned = [](std::uint64_t budget, bool sequence) {
+    relit_open_options options = default_options();
+    options.threads = 1;
+    options.memory_budget_bytes = budget;
+    const ApiPlayer player(two_clip_file(), options);
+    REQUIRE(player.result == RELIT_OK);
+    const relit_sequence_entry entries[] = {{0, 1, 0}, {1, 1, 0.2}};
+    if (sequence) REQUIRE(relit_play_sequence(player, entries, 2, 0) == RELIT_OK);
+    waited(player);
+    moment_of(player, 0);
+    return statistics_of(player).planned_bytes;
+  };
+  const std::uint64_t plenty = std::uint64_t{1} << 40;
+  const std::uint64_t one = planned(plenty, false), two = planned(plenty, true);
+  CHECK(two > one);
+  CHECK(planned(two - 1, true) < two);
+
+  relit_open_options options = default_options();
+  options.threads = 1;
+  // The least budget of one clip: 1 at a time below it is refused.
+  std::uint64_t low = 0, high = one;
+  while (high - low > 1) {
+    options.memory_budget_bytes = low + (high - low) / 2;
+    const ApiPlayer player(two_clip_file(), options);
+    (player.result == RELIT_OK ? high : low) = options.memory_budget_bytes;
+  }
+  options.memory_budget_bytes = high;
+  const ApiPlayer player(two_clip_file(), options);
+  REQUIRE(player.result == RELIT_OK);
+  waited(player);
+  const auto before = light_map(player);
+  const relit_sequence_entry entries[] = {{0, 1, 0}, {1, 1, 0.2}};
+  CHECK(relit_play_sequence(player, entries, 2, 0) == RELIT_OUT_OF_MEMORY);
+  CHECK(player.error().find_first_of("0123456789") != std::string::npos);
+  CHECK(relit_play_clip(player, 1, 0.2) == RELIT_OUT_OF_MEMORY);
+  waited(player);
+  CHECK(moment_of(player, 0).clip == 0);
+  CHECK(light_map(player) == before);
+  CHECK(statistics_of(player).planned_bytes <= high);
+  // A cut needs no more than a clip.
+  CHECK(relit_play_clip(player, 1, 0) == RELIT_OK);
+  CHECK(waited(player).clip == 1);
+}
+
 TEST_CASE("api: two players share a pool, and it outlives the host's hold") {
   relit_pool* pool = nullptr;
   relit_pool_options pools;
