@@ -375,6 +375,7 @@ TEST_CASE("api: statistics add up") {
   CHECK(s.threads >= 1);
 }
 
+// At 400 000 bytes the shipped clip is in its third of five segments.
 TEST_CASE("api: a source that stalls holds up neither updates nor closing") {
   struct Source {
     std::atomic<std::size_t> at{0};
@@ -385,7 +386,7 @@ TEST_CASE("api: a source that stalls holds up neither updates nor closing") {
   callbacks.user = &source;
   callbacks.read = [](void* user, std::uint8_t* out, std::size_t bytes) -> std::int64_t {
     auto& s = *static_cast<Source*>(user);
-    while (s.stall && s.at > 700'000) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    while (s.stall && s.at > 400'000) std::this_thread::sleep_for(std::chrono::milliseconds(1));
     const std::size_t n = std::min({bytes, mannequin().size() - s.at, std::size_t{4096}});
     std::copy_n(mannequin().begin() + static_cast<std::ptrdiff_t>(s.at), n, out);
     s.at += n;
@@ -397,11 +398,17 @@ TEST_CASE("api: a source that stalls holds up neither updates nor closing") {
   REQUIRE(relit_open_callbacks(&callbacks, nullptr, &player) == RELIT_OK);
   waited(player);
   relit_moment moment{};
-  for (int i = 0; i < 300; ++i) moment = moment_of(player, i * 20 * kMs);
+  int step = 0;
+  for (; step < 300; ++step) moment = moment_of(player, step * 20 * kMs);
+  // Six seconds have gone by on this clock; what came before the stall may still be in the decoder.
+  for (; step < 10'000 && moment.late == 0; ++step) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    moment = moment_of(player, step * 20 * kMs);
+  }
   CHECK(moment.late == 1);
-  // The clock stands where the source does: nothing was passed over in the six seconds.
+  // The clock stands where the source does: nothing was passed over.
   const std::uint64_t frame = moment.frame;
-  CHECK(frame < clip_of(player).frame_count);
+  CHECK(frame < 3 * 25);
   CHECK(relit_play_clip(player, 0, 0) == RELIT_OK);
   CHECK(relit_play_clip(player, 1, 0) == RELIT_NOT_FOUND);
   CHECK(relit_set_speed(player, -1) == RELIT_UNSUPPORTED);
