@@ -67,7 +67,8 @@ class Relighter {
   /// Folds a light into the model. Planes of layers that `decoded` says are not there weigh
   /// nothing; empty: all are. Errors: kInvalid; the light is black then.
   Status set_light(const decoders::Light& light, std::span<const std::uint8_t> decoded = {});
-  void set_quality(const RelightQuality& quality);
+  /// Whether it is another one: other planes may be needed then.
+  bool set_quality(const RelightQuality& quality);
   /// Radiance × exposure is what is displayed; 0: unknown. See PlaneNeeds.
   void set_exposure(float exposure);
 
