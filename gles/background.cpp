@@ -13,7 +13,7 @@
 namespace relit::gles {
 namespace {
 
-constexpr std::string_view kPosition[] = {"a_position"};
+constexpr std::string_view kBackgroundAttributes[] = {"a_position"};
 
 // The eight-bit form: bytes are roots of values over their texel's largest, which is in alpha. The
 // most that it holds is kRootRange², in means of the environment.
@@ -63,8 +63,9 @@ Result<BackgroundRenderer> BackgroundRenderer::create(const Device& device) {
   StateGuard guard(device);
   const std::string_view vertex[] = {shaders::present_vert};
   const std::string_view fragment[] = {shaders::dither, shaders::gradient_frag};
-  RELIT_ASSIGN(renderer.gradient_, build_program(device.gl(), device.profile(),
-                                                 {"gradient", "", vertex, fragment, kPosition}));
+  RELIT_ASSIGN(renderer.gradient_,
+               build_program(device.gl(), device.profile(),
+                             {"gradient", "", vertex, fragment, kBackgroundAttributes}));
   renderer.gradient_top_ = device.gl().GetUniformLocation(renderer.gradient_.name(), "u_top");
   renderer.gradient_bottom_ = device.gl().GetUniformLocation(renderer.gradient_.name(), "u_bottom");
   return renderer;
@@ -153,8 +154,9 @@ Result<BackgroundRenderer::SkyProgram*> BackgroundRenderer::sky_program(ToneMap 
                               (half_float_ ? "" : "SHARED_ROOT 1\n");
   const std::string_view vertex[] = {shaders::background_vert};
   const std::string_view fragment[] = {shaders::dither, shaders::color, shaders::background_frag};
-  RELIT_ASSIGN(sky.program, build_program(device_->gl(), device_->profile(),
-                                          {"background", defines, vertex, fragment, kPosition}));
+  RELIT_ASSIGN(sky.program,
+               build_program(device_->gl(), device_->profile(),
+                             {"background", defines, vertex, fragment, kBackgroundAttributes}));
   const Functions& gl = device_->gl();
   sky.rays = gl.GetUniformLocation(sky.program.name(), "u_rays");
   sky.scale = gl.GetUniformLocation(sky.program.name(), "u_scale");

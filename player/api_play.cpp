@@ -14,8 +14,6 @@ using namespace relit::player::api;  // NOLINT
 
 namespace {
 
-Unexpected invalid(std::string message) { return fail(ErrorCode::kInvalid, std::move(message)); }
-
 Result<LightField> steady(decoders::Light light) {
   LightFieldParts parts;
   parts.lights.push_back(std::move(light));
