@@ -140,12 +140,13 @@ class Relighter {
     void set(const decoders::FrameView& view);
     [[nodiscard]] bool matches(const decoders::FrameView& view) const;
   };
-  // How far measuring has come: rounds of all paths, one after the other.
+  // How far measuring has come: rounds of all paths, one after the other. Begins with zeros; Clang 14
+  // finds no initializers of its own here for std::optional.
   struct Measuring {
-    std::size_t step = 0;
-    CompositePath before = CompositePath::kAuto;
-    std::array<bool, kCompositePaths> failed{};
-    std::array<double, kCompositePaths> least_s{};  // 0: none yet
+    std::size_t step;
+    CompositePath before;  // that ran
+    std::array<bool, kCompositePaths> failed;
+    std::array<double, kCompositePaths> least_s;  // 0: none yet
   };
   // What the last composite was made of.
   struct Moment {
