@@ -2,6 +2,7 @@
 #include "container/byte_source.hpp"
 
 #include <fcntl.h>
+#include <poll.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -31,16 +32,19 @@ Status ByteSource::seek(std::uint64_t) {
   return fail(ErrorCode::kUnsupported, "this source can only be read from front to back");
 }
 
-Result<std::unique_ptr<FileSource>> FileSource::open(const std::string& path) {
+Result<std::unique_ptr<FileSource>> FileSource::open(const std::string& path,
+                                                     std::function<bool()> interrupt) {
   if (path == "-")
     return std::unique_ptr<FileSource>(
-        new FileSource(STDIN_FILENO, false, "standard input", std::nullopt));
+        new FileSource(STDIN_FILENO, false, "standard input", std::move(interrupt)));
   int descriptor = -1;
   do {
-    descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+    // Opening a named pipe would wait for its writer. Regular files do not heed the flag.
+    descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   } while (descriptor < 0 && errno == EINTR);
   if (descriptor < 0) return system_failure("cannot open '" + path + "'", errno);
-  std::unique_ptr<FileSource> source(new FileSource(descriptor, true, "'" + path + "'", {}));
+  std::unique_ptr<FileSource> source(
+      new FileSource(descriptor, true, "'" + path + "'", std::move(interrupt)));
   struct stat info {};
   if (::fstat(descriptor, &info) != 0)
     return system_failure("cannot examine '" + path + "'", errno);
@@ -53,15 +57,29 @@ FileSource::~FileSource() {
   if (owned_) ::close(descriptor_);
 }
 
+// A named pipe that no writer has opened yet is waited for like one that has nothing to say: to
+// read from it would look like its end.
+Status FileSource::wait_for_bytes() const {
+  constexpr int kPollMs = 100;
+  for (;;) {
+    if (interrupt_ && interrupt_())
+      return fail(ErrorCode::kCancelled, "reading " + name_ + " was cancelled");
+    pollfd descriptor{descriptor_, POLLIN, 0};
+    // What poll() finds wrong, read() says.
+    const int ready = ::poll(&descriptor, 1, interrupt_ ? kPollMs : -1);
+    if (ready > 0 || (ready < 0 && errno != EINTR)) return {};
+  }
+}
+
 Result<std::size_t> FileSource::read(std::span<std::uint8_t> out) {
   // POSIX leaves requests beyond SSIZE_MAX open, and Linux moves less than 2 GiB at once.
   const std::size_t wanted = std::min<std::size_t>(out.size(), std::size_t{1} << 30);
-  ssize_t got = 0;
-  do {
-    got = ::read(descriptor_, out.data(), wanted);
-  } while (got < 0 && errno == EINTR);
-  if (got < 0) return system_failure("cannot read " + name_, errno);
-  return static_cast<std::size_t>(got);
+  for (;;) {
+    if (!size_) RELIT_TRY(wait_for_bytes());
+    const ssize_t got = ::read(descriptor_, out.data(), wanted);
+    if (got >= 0) return static_cast<std::size_t>(got);
+    if (errno != EINTR && errno != EAGAIN) return system_failure("cannot read " + name_, errno);
+  }
 }
 
 Status FileSource::seek(std::uint64_t offset_bytes) {

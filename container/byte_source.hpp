@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -41,8 +42,11 @@ class ByteSource {
 class FileSource final : public ByteSource {
  public:
   /// Opens `path`; "-" is standard input, which is treated as a pipe whatever it is and stays open.
-  /// Errors: kIo with the system's reason, for directories too.
-  static Result<std::unique_ptr<FileSource>> open(const std::string& path);
+  /// A named pipe need not have a writer yet. `interrupt` is polled at least every 100 ms while
+  /// what is no regular file has nothing to read, by the thread that reads; true: read() gives
+  /// kCancelled. Errors: kIo with the system's reason, for directories too.
+  static Result<std::unique_ptr<FileSource>> open(const std::string& path,
+                                                  std::function<bool()> interrupt = {});
   ~FileSource() override;
   FileSource(const FileSource&) = delete;
   FileSource& operator=(const FileSource&) = delete;
@@ -53,12 +57,17 @@ class FileSource final : public ByteSource {
   Status seek(std::uint64_t offset_bytes) override;
 
  private:
-  FileSource(int descriptor, bool owned, std::string name, std::optional<std::uint64_t> size)
-      : descriptor_(descriptor), owned_(owned), name_(std::move(name)), size_(size) {}
+  FileSource(int descriptor, bool owned, std::string name, std::function<bool()> interrupt)
+      : descriptor_(descriptor),
+        owned_(owned),
+        name_(std::move(name)),
+        interrupt_(std::move(interrupt)) {}
+  Status wait_for_bytes() const;
 
   int descriptor_;
   bool owned_;
   std::string name_;
+  std::function<bool()> interrupt_;
   std::optional<std::uint64_t> size_;  ///< regular files only
 };
 

@@ -153,9 +153,6 @@ Status Player::State::bring_light(bool& changed) {
   const Quality quality = governor->quality();
   for (ClipVoice* voice : voices()) {
     if (voice == nullptr) continue;
-    Relighter& relighter = *voice->relighter();
-    if (fold) RELIT_TRY(voice->set_light(light->now()));
-    if (!fold && (recomposite || settle)) RELIT_TRY(voice->fetch_needed(settle));
     std::size_t planes = 0;
     for (const container::LayerRecord& layer : voice->prefetcher().layers())
       planes += layer.planes.size();
@@ -164,7 +161,13 @@ Status Player::State::bring_light(bool& changed) {
       relight.planes = std::max(
           1, static_cast<int>(std::ceil(quality.planes_share * static_cast<double>(planes))));
     relight.half_size = quality.half_size;
-    relighter.set_quality(relight);
+    // First, as it decides which layers are needed.
+    const bool traded = voice->relighter()->set_quality(relight);
+    if (fold) {
+      RELIT_TRY(voice->set_light(light->now()));
+    } else if (traded || recomposite || settle) {
+      RELIT_TRY(voice->fetch_needed(settle));
+    }
   }
   light_stale = false;
   return {};

@@ -130,10 +130,11 @@ Status Relighter::set_light(const decoders::Light& light, std::span<const std::u
   return folded;
 }
 
-void Relighter::set_quality(const RelightQuality& quality) {
-  if (quality == quality_) return;
+bool Relighter::set_quality(const RelightQuality& quality) {
+  if (quality == quality_) return false;
   quality_ = quality;
   change_light();
+  return true;
 }
 
 void Relighter::set_exposure(float exposure) {

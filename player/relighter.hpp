@@ -67,7 +67,8 @@ class Relighter {
   /// Folds a light into the model. Planes of layers that `decoded` says are not there weigh
   /// nothing; empty: all are. Errors: kInvalid; the light is black then.
   Status set_light(const decoders::Light& light, std::span<const std::uint8_t> decoded = {});
-  void set_quality(const RelightQuality& quality);
+  /// Whether it is another one: other planes may be needed then.
+  bool set_quality(const RelightQuality& quality);
   /// Radiance × exposure is what is displayed; 0: unknown. See PlaneNeeds.
   void set_exposure(float exposure);
 
@@ -139,12 +140,13 @@ class Relighter {
     void set(const decoders::FrameView& view);
     [[nodiscard]] bool matches(const decoders::FrameView& view) const;
   };
-  // How far measuring has come: rounds of all paths, one after the other.
+  // How far measuring has come: rounds of all paths, one after the other. Begins with zeros; Clang 14
+  // finds no initializers of its own here for std::optional.
   struct Measuring {
-    std::size_t step = 0;
-    CompositePath before = CompositePath::kAuto;
-    std::array<bool, kCompositePaths> failed{};
-    std::array<double, kCompositePaths> least_s{};  // 0: none yet
+    std::size_t step;
+    CompositePath before;  // that ran
+    std::array<bool, kCompositePaths> failed;
+    std::array<double, kCompositePaths> least_s;  // 0: none yet
   };
   // What the last composite was made of.
   struct Moment {

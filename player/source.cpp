@@ -11,7 +11,7 @@ Result<std::unique_ptr<container::ByteSource>> open_source(const std::string& so
     RELIT_ASSIGN(auto http, HttpSource::open(source, options));
     return std::unique_ptr<container::ByteSource>(std::move(http));
   }
-  RELIT_ASSIGN(auto file, container::FileSource::open(source));
+  RELIT_ASSIGN(auto file, container::FileSource::open(source, options.interrupt));
   return std::unique_ptr<container::ByteSource>(std::move(file));
 }
 

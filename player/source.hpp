@@ -23,8 +23,8 @@ struct SourceOptions {
   double read_timeout_s = 10;  ///< without a single byte
   /// How long a broken connection is taken up again without a byte coming; 0: not at all.
   double retry_s = 20;
-  /// Polled at least every 100 ms while waiting, from the thread that reads; true: stop with
-  /// kCancelled.
+  /// Polled at least every 100 ms while waiting for a server or a pipe, from the thread that reads;
+  /// true: stop with kCancelled.
   std::function<bool()> interrupt;
   std::function<void(const std::string&)> warn;  ///< takes a sentence for the user
 };

@@ -185,6 +185,31 @@ TEST_CASE("a named pipe is written and read from front to back") {
   CHECK(all->finished);
 }
 
+TEST_CASE("waiting for a pipe can be interrupted, and goes on all the same") {
+  TemporaryDirectory directory;
+  const auto path = directory.path("pipe");
+  REQUIRE(::mkfifo(path.c_str(), 0600) == 0);
+  // Before anybody writes, then while nobody does.
+  int polls = 0;
+  bool stop = true;
+  const auto source = FileSource::open(path, [&] { return stop && ++polls > 3; }).value();
+  std::vector<std::uint8_t> some(10);
+  const auto refused = source->read(some);
+  REQUIRE_FALSE(refused);
+  CHECK(refused.error().code == ErrorCode::kCancelled);
+  const int writer = ::open(path.c_str(), O_WRONLY | O_CLOEXEC);
+  REQUIRE(writer >= 0);
+  polls = 0;
+  CHECK(source->read(some).error().code == ErrorCode::kCancelled);
+  CHECK(polls > 3);
+  stop = false;
+  REQUIRE(::write(writer, "abc", 3) == 3);
+  CHECK(source->read(some).value() == 3);
+  CHECK(some[2] == 'c');
+  ::close(writer);
+  CHECK(source->read(some).value() == 0);
+}
+
 TEST_CASE("files that cannot be read are named") {
   TemporaryDirectory directory;
   const auto missing = FileSource::open(directory.path("nothing"));

@@ -375,6 +375,26 @@ TEST_CASE("api: statistics add up") {
   CHECK(s.threads >= 1);
 }
 
+TEST_CASE("api: planes that a low quality left out come back with a high one") {
+  const ApiPlayer player(mannequin());
+  REQUIRE(player.result == RELIT_OK);
+  REQUIRE(relit_set_paused(player, 1) == RELIT_OK);
+  moment_of(player, 0);
+  waited(player);
+  const std::vector<float> all = light_map(player);
+  REQUIRE(relit_set_quality(player, 0) == RELIT_OK);
+  // So long that what the quality does not need is fetched no more.
+  for (int i = 0; i < 200; ++i) moment_of(player, i * 20 * kMs);
+  REQUIRE(relit_seek_frame(player, 1) == RELIT_OK);
+  waited(player);
+  CHECK(light_map(player) != all);
+  REQUIRE(relit_set_quality(player, 1) == RELIT_OK);
+  REQUIRE(relit_turn_light(player, 0) == RELIT_OK);
+  REQUIRE(relit_seek_frame(player, 0) == RELIT_OK);
+  waited(player);
+  CHECK(light_map(player) == all);
+}
+
 // At 400 000 bytes the shipped clip is in its third of five segments.
 TEST_CASE("api: a source that stalls holds up neither updates nor closing") {
   struct Source {
