@@ -199,7 +199,7 @@ Result<bool> Relighter::measure(const FrameMix& mix, gles::CharacterRenderer& re
                                 const gles::View& view) {
   constexpr std::size_t kRounds = 4, kPaths = kCompositePaths;
   if (!measuring_) {
-    measuring_.emplace();
+    measuring_ = Measuring{};
     measuring_->before = path_;
   }
   Measuring& m = *measuring_;

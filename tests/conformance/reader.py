@@ -4,8 +4,7 @@
 
 info prints the parsed structure (status 0: all was read; 1: the file cannot be used; 3: records
 were lost). frames prints hashes of decoded planes, coefficients at probe texels and posed positions
-(status 0 or 1). Needs only the standard library, libzstd, libmeshoptimizer and libavcodec.
-"""
+(status 0 or 1). Needs only the standard library, libzstd, libmeshoptimizer and libavcodec."""
 import collections, contextlib, ctypes, ctypes.util, io, itertools, json, math, pathlib, re, struct
 import sys, zlib
 
@@ -210,8 +209,7 @@ def record_at(data, at):
     good = zlib.crc32(body) == crc and not any(data[at + 24 + length:end])
     return Record(at, flags, kind.decode(), length, crc, body if good else None, end)
 
-def varints(raw):
-    """All numbers of a table."""
+def varints(raw):               # all numbers of a table
     codes = re.findall(rb"[\x00-\x7f]|[\x80-\xff]{1,8}[\x01-\x7f]|[\x80-\xff]{9}\x01", raw)
     need(b"".join(codes) == raw, "not the shortest form, or beyond 64 bits")
     return [sum((byte & 127) << 7 * i for i, byte in enumerate(c)) for c in codes]
@@ -290,8 +288,7 @@ class File:
             self.lost.update(records=1 + len(self.awaited), bytes=max(0, found - at))
         self.awaited, self.rank, self.suspect = [], ORDER.index("SEGM"), 0
         return found
-    def copies(self):
-        """Yields the copies of the static records behind HEAD."""
+    def copies(self):           # yields those of the static records behind HEAD
         end = record_at(self.data, self.size - 48)
         need(end.type == "FEND", "no FEND leads to copies")
         r = record_at(self.data, parse("FEND", end.body)["copies_offset"])
@@ -335,7 +332,11 @@ class File:
             frames = range(s["first_frame"], s["first_frame"] + s["frames"])
             need(keys[0] and times[0] == frames[0] and set(times) <= set(frames), "packets")
         announced.update(packets=[*zip(times, keys, sizes)], data=b"".join(packets))
-        times = [time - s["first_frame"] for time in times]
+        first, end = s["first_frame"], s["first_frame"] + s["frames"]
+        for t in [t for t in self.segments[:-1] if (t["index"], d["track"]) in self.packets]:
+            if first == t["first_frame"]: del self.packets[t["index"], d["track"]]
+            elif first < t["first_frame"] + t["frames"] and t["first_frame"] < end: return
+        times = [time - first for time in times]
         self.packets[s["index"], d["track"]] = dict(zip(times, packets))
     def info(self):
         s, chunks = self.records, [c for segment in self.segments for c in segment["chunks"]]
@@ -368,8 +369,8 @@ def open_decoder(track):
     need(kind and (codec := AV.avcodec_find_decoder(kind.at(0))), f"no decoder: {track['codec']}")
     context, extra = AV.avcodec_alloc_context3(codec), memory(track["codec_private"] + bytes(64))
     gap = 28 if AV.avcodec_version() < 60 << 16 | 30 << 8 else 44
-    fields = (0, kind.at(0), ctypes.addressof(extra), len(extra) - 65, *track["coded"])
-    AV.avcodec_parameters_to_context(context, memory(struct.pack(f"<2i8xQi{gap}x2i", *fields), 512))
+    fields = (0, kind.at(0), ctypes.addressof(extra), len(extra) - 65, *track["coded"], 0, 1)
+    AV.avcodec_parameters_to_context(context, memory(struct.pack(f"<2i8xQi{gap}x4i", *fields), 512))
     for option in OPTIONS: AV.av_opt_set(context, *option.split(), 0)
     need(AV.avcodec_open2(context, codec, None) == 0, "codec_private")
     return context
@@ -496,8 +497,7 @@ def open_mesh(mesh, palette):
               for pair in zip(joints[i], weights[i]) if pair[1]])
             for i, p in enumerate(positions)]
 
-def product(a, b):
-    """Of row-major 3×4 matrices."""
+def product(a, b):              # of row-major 3×4 matrices
     return [sum(a[r + k] * b[4 * k + c] for k in range(3)) + (a[r + 3] if c == 3 else 0)
             for r in (0, 4, 8) for c in range(4)]
 
