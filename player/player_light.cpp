@@ -9,10 +9,8 @@
 namespace relit::player {
 
 Result<PlayerLight> PlayerLight::create() {
-  LightFieldParts white;
   const double level = 1 / decoders::kBand0;
-  white.lights.push_back({{{level, level, level}}});
-  RELIT_ASSIGN(LightField field, LightField::create(std::move(white)));
+  RELIT_ASSIGN(LightField field, LightField::steady({{{level, level, level}}}));
   return PlayerLight(std::move(field));
 }
 

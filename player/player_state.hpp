@@ -74,6 +74,7 @@ struct Player::State final : FrameTimes {
   void note_shown(const Moment& now);
   [[nodiscard]] bool stands(std::int64_t now_ns);
   Result<bool> wait(double timeout_s);
+  Result<bool> show_frame(std::uint64_t frame, double timeout_s);
   Result<bool> wait_for(ClipVoice& voice, const FramePosition& position, double timeout_s);
   Status source_error();
 

@@ -266,4 +266,23 @@ Result<bool> Player::State::wait(double timeout_s) {
   return here && !moment.late;
 }
 
+// Where frames are unevenly spaced, when this one is shown becomes known as it comes; of one whose
+// segment is lost it never does, and what is shown stays.
+Result<bool> Player::State::show_frame(std::uint64_t frame, double timeout_s) {
+  const Clock::time_point begin = Clock::now();
+  Status sought = playback->seek_frame(frame);
+  if (!sought) {
+    Prefetcher& prefetcher = primary->prefetcher();
+    prefetcher.want(frame);
+    RELIT_ASSIGN(const bool here, prefetcher.wait(frame, timeout_s));
+    if (!here) return false;
+    sought = playback->seek_frame(frame);
+    if (!sought && moment.ready) return prefetcher.frame(frame) != nullptr;
+  }
+  RELIT_TRY(sought);
+  light_time_s = playback->now().time_s;
+  jumped();
+  return wait(std::max(0.0, timeout_s - seconds_since(begin)));
+}
+
 }  // namespace relit::player

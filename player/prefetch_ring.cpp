@@ -29,7 +29,7 @@ std::optional<std::uint64_t> State::following(std::uint64_t index) const {
   const std::uint64_t count = demuxer.clip().frame_count;
   const std::uint64_t next = index + 1;
   if (loop && (next == loop_end || next >= count)) return loop_begin;
-  if (next >= count) return std::nullopt;
+  if (next >= end_after(index)) return std::nullopt;
   return next;
 }
 

@@ -134,6 +134,7 @@ struct Prefetcher::State {
   void after_event();
   void fail_with(Error error);
   [[nodiscard]] std::uint64_t lap_end() const;
+  [[nodiscard]] std::uint64_t end_after(std::uint64_t frame) const;
 
   ClipDemuxer demuxer;  ///< the demux thread's; what never changes is everybody's
   std::shared_ptr<WorkerPool> pool;
@@ -160,6 +161,7 @@ struct Prefetcher::State {
 
   bool loop = false;
   std::uint64_t loop_begin = 0, loop_end = 0;
+  std::uint64_t end_frame = 0;  ///< PrefetchOptions::end_frame
 
   std::array<Slot*, 256> ring{};
   std::uint64_t head = 0, tail = 0;  ///< seq

@@ -38,6 +38,7 @@ Result<std::unique_ptr<Prefetcher>> Prefetcher::create(ClipDemuxer demuxer,
     s.planes = options.planes;
     s.impatient = options.impatient;
     s.start = s.wanted_index = options.first_frame;
+    s.end_frame = options.end_frame;
     RELIT_TRY(s.open_tracks(options, std::move(pool)));
     std::unique_ptr<Prefetcher> prefetcher(new Prefetcher(std::move(state)));
     std::vector<std::uint8_t> layers = options.layers;

@@ -33,6 +33,8 @@ struct PrefetchOptions {
   std::shared_ptr<decoders::PictureMemory> memory;
   std::string decoder;            ///< tried first, by libavcodec's name; empty: software
   std::uint64_t first_frame = 0;  ///< where to begin
+  /// Nothing is fetched for frames from this one on, unless playback goes there; 0: the clip's end.
+  std::uint64_t end_frame = 0;
   /// The first picture after the beginning or a jump need not wait for all layers: frame() gives it
   /// with `complete` false as soon as the pose and the most important layer are there.
   bool impatient = true;

@@ -114,7 +114,7 @@ void WindowSession::move_camera(const Action& action) {
   const auto& low = clip().bounds_min;
   const auto& high = clip().bounds_max;
   const glm::vec3 from(low[0], low[1], low[2]), to(high[0], high[1], high[2]);
-  const double fitting = fitting_distance(camera_, from, to, aspect());
+  const double fitting = fitting_distance(camera_, from, to, size_.aspect());
   if (camera_.distance <= 0) camera_.distance = fitting;
   switch (action.kind) {
     case ActionKind::kOrbit:
@@ -127,7 +127,7 @@ void WindowSession::move_camera(const Action& action) {
       camera_.distance = std::clamp(camera_.distance * action.amount, 0.02 * fitting, 50 * fitting);
       break;
     default:
-      camera_ = options_.view.camera;
+      camera_ = options_.camera;
       say("camera reset");
       break;
   }
@@ -154,7 +154,7 @@ Status WindowSession::change_light(int way) {
     return {};
   }
   const std::size_t next = around(light_, way, lights_.size());
-  RELIT_TRY(use_light(*player_, lights_[next]));
+  RELIT_TRY(player_->set_light(lights_[next]));
   light_ = next;
   light_turn_rad_ = 0;
   RELIT_TRY(player_->turn_light(0));

@@ -41,12 +41,9 @@ Result<std::size_t> find_clip(const container::FileContents& contents, const std
 Result<std::unique_ptr<WindowSession>> WindowSession::create(const WindowOptions& options,
                                                              MakeDevice make_device) {
   std::unique_ptr<WindowSession> session(new WindowSession(options, std::move(make_device)));
-  RELIT_ASSIGN(session->look_, parse_look(options.view));
-  session->camera_ = options.view.camera;
-  for (const LoadedLight& light : options.lights) {
-    RELIT_ASSIGN(Light taken, take_light(light));
-    session->lights_.push_back(std::move(taken));
-  }
+  RELIT_ASSIGN(session->look_, parse_look(options.look));
+  session->camera_ = options.camera;
+  session->lights_ = options.lights;
   session->path_ = options.player.path;
   session->quality_ = options.player.governor.quality;
   RELIT_ASSIGN(Opened opened, session->open(options.source, true));
@@ -88,7 +85,7 @@ Result<WindowSession::Opened> WindowSession::open(const std::string& source, boo
 }
 
 Status WindowSession::start(Player& player, bool as_asked) const {
-  if (!lights_.empty()) RELIT_TRY(use_light(player, lights_[light_]));
+  if (!lights_.empty()) RELIT_TRY(player.set_light(lights_[light_]));
   RELIT_TRY(player.turn_light(light_turn_rad_));
   player.set_position(options_.position);
   if (!as_asked) return {};
@@ -116,22 +113,6 @@ void WindowSession::use(Opened opened) {
   changed_ = true;
 }
 
-Result<WindowSession::Light> WindowSession::take_light(LoadedLight light) {
-  LightFieldParts parts;
-  parts.lights = {light.light};
-  RELIT_ASSIGN(LightField field, LightField::create(std::move(parts)));
-  Light taken{std::move(light.name), light.field ? std::move(*light.field) : std::move(field),
-              nullptr, light.environment_rotation_rad};
-  if (light.environment)
-    taken.environment =
-        std::make_shared<const decoders::Environment>(std::move(*light.environment));
-  return taken;
-}
-
-Status WindowSession::use_light(Player& player, const Light& light) const {
-  return player.set_light(light.field, light.environment, light.environment_rotation_rad);
-}
-
 void WindowSession::drop(const std::string& path) {
   const std::string end = std::filesystem::path(path).extension().string();
   const bool is_light = end == ".hdr" || end == ".exr" || end == ".json";
@@ -141,14 +122,9 @@ void WindowSession::drop(const std::string& path) {
     use(std::move(*opened));
     return say(title_);
   }
-  const auto take = [&]() -> Result<Light> {
-    RELIT_ASSIGN(LoadedLight loaded, load_light(path, options_.light));
-    RELIT_ASSIGN(Light taken, take_light(std::move(loaded)));
-    RELIT_TRY(use_light(*player_, taken));
-    return taken;
-  };
-  auto light = take();
+  auto light = load_light(path, options_.light);
   if (!light) return say(light.error().message, true);
+  if (const Status set = player_->set_light(*light); !set) return say(set.error().message, true);
   lights_.push_back(std::move(*light));
   light_ = lights_.size() - 1;
   say("light: " + light_text());
@@ -175,24 +151,12 @@ Status WindowSession::update(double now_s) {
 }
 
 Status WindowSession::draw(int width, int height) {
-  width_ = width, height_ = height;
-  const container::ClipRecord& shown = clip();
-  const auto& low = shown.bounds_min;
-  const auto& high = shown.bounds_max;
-  const CameraMatrices matrices =
-      camera_matrices(camera_, {low[0], low[1], low[2]}, {high[0], high[1], high[2]}, aspect());
-  gles::View view;
-  view.view = matrices.view, view.projection = matrices.projection;
-  view.width = width, view.height = height;
-  view.tone_map = look_.tone_map;
-  const double base = look_.exposure_stops ? std::exp2(*look_.exposure_stops)
-                                           : static_cast<double>(player_->auto_exposure());
-  view.exposure = static_cast<float>(base * std::exp2(exposure_stops_));
+  size_ = {width, height};
+  gles::View view = look_at(*player_, look_, camera_, size_);
+  view.exposure *= static_cast<float>(std::exp2(exposure_stops_));
   changed_ = false;
   return player_->draw(view, look_.backdrop);
 }
-
-double WindowSession::aspect() const { return static_cast<double>(width_) / std::max(height_, 1); }
 
 const container::ClipRecord& WindowSession::clip() const {
   return player_->contents().clips[player_->moment().clip];

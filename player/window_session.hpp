@@ -11,7 +11,6 @@
 #include "player/player.hpp"
 #include "player/window.hpp"
 #include "player/window_input.hpp"
-#include "player/window_look.hpp"
 #include "player/window_overlay.hpp"
 
 namespace relit::player {
@@ -66,14 +65,6 @@ class WindowSession {
   WindowSession(const WindowOptions& options, MakeDevice make_device)
       : options_(options), make_device_(std::move(make_device)) {}
 
-  struct Light {
-    std::string name;
-    LightField field;
-    std::shared_ptr<const decoders::Environment> environment;  ///< null: none
-    double environment_rotation_rad = 0;
-  };
-  static Result<Light> take_light(LoadedLight light);
-
   struct Opened {
     std::unique_ptr<Player> player;
     std::string title;
@@ -81,7 +72,6 @@ class WindowSession {
   };
   Result<Opened> open(const std::string& source, bool as_asked) const;
   Status start(Player& player, bool as_asked) const;
-  Status use_light(Player& player, const Light& light) const;
   void use(Opened opened);
 
   Status change(const Action& action);
@@ -97,17 +87,16 @@ class WindowSession {
   [[nodiscard]] const container::ClipRecord& clip() const;
   [[nodiscard]] std::string light_text() const;
   [[nodiscard]] std::string planes_text() const;
-  [[nodiscard]] double aspect() const;
 
   const WindowOptions& options_;
   MakeDevice make_device_;
   std::unique_ptr<Player> player_;
   std::string title_;
   std::shared_ptr<std::string> why_;  ///< the composite path; what the player's log tells
-  std::vector<Light> lights_;
+  std::vector<LoadedLight> lights_;
   std::size_t light_ = 0;
   double light_turn_rad_ = 0;
-  WindowLook look_;
+  Look look_;
   OrbitCamera camera_;
   double exposure_stops_ = 0;  ///< beyond the look's
   CompositePath path_ = CompositePath::kAuto;
@@ -116,7 +105,7 @@ class WindowSession {
 
   Requests requests_;
   bool keys_ = false, statistics_ = false, changed_ = true;
-  int width_ = 1, height_ = 1;
+  ViewSize size_;
   double now_s_ = 0;
   std::optional<double> waiting_since_s_;
   std::string message_;

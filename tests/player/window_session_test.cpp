@@ -218,10 +218,10 @@ TEST_CASE("a session plays sequences, and refuses clips, looks and files that ar
   CHECK(no_clip.opened.error().message.find("walk") != std::string::npos);
   for (const auto& [what, adapt] :
        std::vector<std::pair<const char*, std::function<void(WindowOptions&)>>>{
-           {"--exposure", [](WindowOptions& o) { o.view.exposure = "bright"; }},
-           {"--tone-map", [](WindowOptions& o) { o.view.tone_map = "sepia"; }},
-           {"--background", [](WindowOptions& o) { o.view.background = "#12345"; }},
-           {"--background", [](WindowOptions& o) { o.view.background = "#12345g"; }},
+           {"--exposure", [](WindowOptions& o) { o.look.exposure = "bright"; }},
+           {"--tone-map", [](WindowOptions& o) { o.look.tone_map = "sepia"; }},
+           {"--background", [](WindowOptions& o) { o.look.background = "#12345"; }},
+           {"--background", [](WindowOptions& o) { o.look.background = "#12345g"; }},
            {"nowhere", [](WindowOptions& o) { o.source = "/nowhere/at.relit"; }}}) {
     const Session refused(adapt);
     REQUIRE_FALSE(refused.opened);
