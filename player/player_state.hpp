@@ -143,7 +143,7 @@ struct Player::State final : FrameTimes {
   std::unique_ptr<Character> character;
   std::optional<Backdrop> backdrop;  ///< that the renderer has; none: none yet
   unsigned backdrop_light = 0;       ///< PlayerLight::generation() that it was made of
-  bool backdrop_stale = true;        ///< the harmonics behind have changed
+  unsigned backdrop_harmonics = 0;   ///< likewise unturned_generation()
   bool positions_uploaded = false;
   float exposure = 0;  ///< that relighters know
   std::uint64_t draws = 0;

@@ -147,7 +147,6 @@ Status Player::State::bring_light(bool& changed) {
   const bool settle =
       !layers_settled && !light->varies() && counted.updates - light_changed_at >= kRestingUpdates;
   layers_settled |= settle;
-  if (moved) backdrop_stale = true;
   const Quality quality = governor->quality();
   for (ClipVoice* voice : voices()) {
     if (voice == nullptr) continue;
