@@ -60,6 +60,7 @@ PrefetchOptions Player::State::prefetch_options(std::size_t layer_count, bool ro
   prefetch.decoder = options.decoder;
   prefetch.memory = options.pictures;
   prefetch.loop = round;
+  prefetch.every = static_cast<std::uint64_t>(governor->quality().frames_every);
   if (options.sparing) prefetch.ring_bytes = 0, prefetch.packet_bytes = 1;
   return prefetch;
 }
@@ -212,6 +213,11 @@ Status Player::set_layers(int layers) {
   }
   state_->light_stale = true;
   return {};
+}
+
+void Player::set_planes(int planes) {
+  state_->planes = planes;
+  state_->recomposite = true;
 }
 
 void Player::set_interpolation(bool on) { state_->options.interpolate = on; }

@@ -93,6 +93,7 @@ struct PlayerStats {
   std::uint64_t updates = 0, shown = 0, repeated = 0, late = 0, waiting = 0;
   std::uint64_t skipped_frames = 0;  ///< of the clip, that were due and never shown
   std::uint64_t composites = 0;
+  std::uint64_t planes_uploaded = 0;  ///< to the GPU, of the clip that is playing
   PlaybackLoss loss;
   PrefetchStats prefetch;  ///< of the clip that is playing
   double decode_ms = 0;    ///< of pool threads, for a frame; means since the player was opened
@@ -172,6 +173,8 @@ class Player {
 
   /// The first so many layers; -1: all that the plan allows.
   Status set_layers(int layers);
+  /// The first so many planes, of those that the governor leaves; -1: all.
+  void set_planes(int planes);
   void set_interpolation(bool on);
   Status set_path(CompositePath path);
   Status set_quality(std::optional<double> quality);

@@ -244,6 +244,7 @@ PlayerStats Player::State::stats() const {
   stats.pose_ms = 1e3 * pose_s.value();
   stats.draw_ms = 1e3 * draw_s.value();
   stats.composites = relighter.stats().composites;
+  stats.planes_uploaded = relighter.stats().planes_uploaded;
   stats.gpu_bytes = relighter.gpu_bytes() + (character ? character->renderer().gpu_bytes() : 0);
   stats.quality = governor->value();
   stats.chosen = governor->quality();

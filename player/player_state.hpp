@@ -95,7 +95,7 @@ struct Player::State final : FrameTimes {
   std::shared_ptr<const ClipDemuxer::Statics> statics;
   std::shared_ptr<WorkerPool> pool;
   MemoryPlan plan;
-  int layers = -1;
+  int layers = -1, planes = -1;
 
   std::optional<Playback> playback;
   std::optional<Governor> governor;

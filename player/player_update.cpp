@@ -80,9 +80,7 @@ Status Player::State::show(const Moment& now, bool at_once) {
   RELIT_TRY(bring_light(anew));
   const Quality quality = governor->quality();
   const bool blend = options.interpolate && quality.frames_every == 1;
-  FramePosition position = now.primary;
-  position.frame -= position.frame % static_cast<unsigned>(quality.frames_every);
-  primary_frames = primary->go_to(position, blend);
+  primary_frames = primary->go_to(now.primary, blend);
   secondary_frames = {};
   if (now.secondary) secondary_frames = secondary->go_to(*now.secondary, blend);
   const bool both = secondary_frames.from != nullptr;
@@ -151,17 +149,17 @@ Status Player::State::bring_light(bool& changed) {
   for (ClipVoice* voice : voices()) {
     if (voice == nullptr) continue;
     Relighter& relighter = *voice->relighter();
-    if (fold) RELIT_TRY(voice->set_light(light->now()));
-    if (!fold && (recomposite || settle)) RELIT_TRY(voice->fetch_needed(settle));
-    std::size_t planes = 0;
-    for (const container::LayerRecord& layer : voice->prefetcher().layers())
-      planes += layer.planes.size();
+    const std::size_t of = relighter.needed_planes().size();
     RelightQuality relight;
     if (quality.planes_share < 1)
-      relight.planes = std::max(
-          1, static_cast<int>(std::ceil(quality.planes_share * static_cast<double>(planes))));
+      relight.planes =
+          std::max(1, static_cast<int>(std::ceil(quality.planes_share * static_cast<double>(of))));
+    if (planes >= 0)
+      relight.planes = relight.planes < 0 ? planes : std::min(relight.planes, planes);
     relight.half_size = quality.half_size;
     relighter.set_quality(relight);
+    voice->prefetcher().set_every(static_cast<std::uint64_t>(quality.frames_every));
+    RELIT_TRY(fold ? voice->set_light(light->now()) : voice->fetch_needed(settle));
   }
   light_stale = false;
   return {};
@@ -269,9 +267,11 @@ Result<bool> Player::State::wait(double timeout_s) {
 // segment is lost it never does, and what is shown stays.
 Result<bool> Player::State::show_frame(std::uint64_t frame, double timeout_s) {
   const Clock::time_point begin = Clock::now();
+  Prefetcher& prefetcher = primary->prefetcher();
+  // Seeking would go to the last one.
+  if (frame >= prefetcher.clip().frame_count) return prefetcher.wait(frame, 0);
   Status sought = playback->seek_frame(frame);
   if (!sought) {
-    Prefetcher& prefetcher = primary->prefetcher();
     prefetcher.want(frame);
     RELIT_ASSIGN(const bool here, prefetcher.wait(frame, timeout_s));
     if (!here) return false;

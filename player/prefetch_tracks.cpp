@@ -75,6 +75,7 @@ bool State::begin_step(Track& track, std::unique_lock<std::mutex>& lock) {
   if (track.incoming) {
     track.decoder = std::exchange(track.incoming, std::nullopt);
     track.segment_no = 0;
+    track.pictures = 0;
   }
   if (track.epoch != demux_epoch) {
     track.epoch = demux_epoch;
@@ -217,9 +218,10 @@ bool State::step(std::size_t number) {
   const Slot& slot = at(track.cursor);
   if (!find_chunk(track, slot)) return false;
   const std::uint64_t seq = track.cursor, index = slot.index;
-  const std::uint64_t no = slot.segment_no;
+  const std::uint64_t no = slot.segment_no, apart = slot.every;
   lock.unlock();
 
+  if (track.decoder) track.decoder->show_every(apart);
   const auto began = Clock::now();
   Status loaded;
   const bool fresh = track.chunk.segment_no == no && track.segment_no != no;
@@ -238,6 +240,12 @@ bool State::step(std::size_t number) {
 
   lock.lock();
   counts.decode_s += took.count();
+  if (track.decoder) {
+    const std::uint64_t pictures = track.decoder->pictures();
+    counts.decoded_pictures += pictures - std::exchange(track.pictures, pictures);
+  } else if (track.pose && fresh) {
+    counts.pose_bytes = track.poses->memory_bytes();
+  }
   if (!loaded) note_damage(loaded.error());
   if (fresh) {
     packet_bytes -= container::storage_bytes(track.chunk.record);
