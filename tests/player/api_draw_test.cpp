@@ -145,12 +145,12 @@ TEST_CASE("api: what it draws is what the command draws") {
                             : context.kind == gles::OffscreenKind::kEglEs2 ? Backend::kEglEs2
                                                                            : Backend::kOsmesa;
     std::string says;
-    const int status = run_relit(
-        "render " + shipped_clip().string() + " --light " + light + " --frame " +
-            std::to_string(kFrame) + " --size " + std::to_string(kSide) + "x" +
-            std::to_string(kSide) + " --samples 1 --exposure 0 --background none --backend " +
-            backend_name(backend) + " -o " + picture,
-        &says);
+    const int status = run_relit("render " + shipped_clip().string() + " --light " + light +
+                                     " --frame " + std::to_string(kFrame) + " --size " +
+                                     std::to_string(kSide) + "x" + std::to_string(kSide) +
+                                     " --samples 1 --exposure 0 --background none --backend " +
+                                     backend_name(backend) + " -o " + picture,
+                                 &says);
     INFO(says);
     REQUIRE(status == 0);
     const auto drawn = decoders::decode_image(read_bytes(picture), "image/png");
