@@ -216,7 +216,9 @@ class UvAssigner {
     return report_;
   }
 
-  PackOptions pack_options() const { return {options_.width, options_.height, options_.gutter}; }
+  ChartPackOptions pack_options() const {
+    return {options_.width, options_.height, options_.gutter};
+  }
 
   // UV units over metres, the median over the triangles.
   static double median_density(const Soup& soup) {

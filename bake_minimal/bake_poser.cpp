@@ -25,11 +25,11 @@ TraceGeometry trace_geometry(const PackedScene& packed) {
     geometry.surface.insert(geometry.surface.end(), mesh.indices.size() / 3, material);
   }
   for (const PackedTriangle& triangle : packed.triangles) {
-    geometry.other_side.push_back(triangle.other_side == kNoTriangle ? kNoOtherSide
-                                                                     : triangle.other_side);
+    geometry.other_side.push_back(triangle.other_side == kSingleSided ? kNoOtherSide
+                                                                      : triangle.other_side);
   }
   for (const container::MaterialRecord& material : packed.materials.materials) {
-    Surface surface;
+    HitSurface surface;
     surface.base_color = {material.base_color[0], material.base_color[1], material.base_color[2],
                           material.base_color[3]};
     for (std::size_t i = 0; i < packed.materials.images.size(); ++i) {
@@ -69,7 +69,7 @@ Status BakePoser::pose(std::uint64_t frame) {
   scene.sample(prepared_->clip, prepared_->time_s(frame), scene_pose_);
   scene.world_matrices(scene_pose_, world_);
   std::size_t first = 0;
-  std::uint32_t posed_primitive = kNoTriangle;
+  std::uint32_t posed_primitive = std::numeric_limits<std::uint32_t>::max();
   for (std::size_t m = 0; m < packed.meshes.size(); ++m) {
     const decoders::Mesh& mesh = packed.meshes[m];
     const PackedMeshSource& source = packed.sources[m];

@@ -3,12 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <string>
 
 namespace relit::bake {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 // A clip without horizontal extent still gets a disc.
 constexpr double kLeastRadius = 1e-3;
 
@@ -47,7 +47,7 @@ Primitive make_disc(const glm::dvec3& centre, double radius, const GroundOptions
     // Shadows and contact lie in the middle; quantised positions and normals do not care.
     const double r = std::pow(static_cast<double>(ring) / o.rings, 1.25);
     for (int s = 0; s < o.segments; ++s) {
-      const double angle = 2 * kPi * s / o.segments;
+      const double angle = 2 * std::numbers::pi * s / o.segments;
       add_vertex(disc, centre, r * glm::dvec2(std::cos(angle), std::sin(angle)), radius);
     }
   }

@@ -23,7 +23,7 @@ bool same_trs(const Trs& a, const Trs& b) {
   return a.translation == b.translation && a.rotation == b.rotation && a.scale == b.scale;
 }
 
-using Components = std::array<std::vector<double>, 3>;
+using AxisSamples = std::array<std::vector<double>, 3>;
 
 class Builder {
  public:
@@ -55,7 +55,7 @@ class Builder {
         n, rotations(source),
         std::clamp(tolerance_.surface / reach, kFinestRotationStep, kCoarsestRelativeStep),
         rest.rotation);
-    const Components s = scales(source);
+    const AxisSamples s = scales(source);
     double largest_scale = 0;
     for (const auto& component : s) {
       for (const double v : component) largest_scale = std::max(largest_scale, std::abs(v));
@@ -70,15 +70,15 @@ class Builder {
     if (needs_rest) out_.rest.push_back(rest);
   }
 
-  Components translations(std::size_t source) const {
+  AxisSamples translations(std::size_t source) const {
     return collect([&](const ScenePose& pose, int i) { return pose.local[source].translation[i]; });
   }
-  Components scales(std::size_t source) const {
+  AxisSamples scales(std::size_t source) const {
     return collect([&](const ScenePose& pose, int i) { return pose.local[source].scale[i]; });
   }
   template <class Get>
-  Components collect(Get get) const {
-    Components out;
+  AxisSamples collect(Get get) const {
+    AxisSamples out;
     for (const ScenePose& pose : poses_) {
       for (int i = 0; i < 3; ++i) out[static_cast<std::size_t>(i)].push_back(get(pose, i));
     }
@@ -96,7 +96,7 @@ class Builder {
   }
 
   /// Adds a channel, or where nothing moves sets `rest`. Returns whether there is a channel.
-  bool add_vector(ChannelTarget target, std::size_t node, const Components& values, double step,
+  bool add_vector(ChannelTarget target, std::size_t node, const AxisSamples& values, double step,
                   std::array<float, 3>& rest) {
     if (constant_within(values, step)) {
       for (std::size_t i = 0; i < 3; ++i) rest[i] = static_cast<float>(middle(values[i]));

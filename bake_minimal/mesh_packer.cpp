@@ -283,7 +283,7 @@ class ScenePacker {
     out_.sources.push_back({primitive, static_cast<std::uint32_t>(out_.triangles.size()),
                             std::move(part.source_vertex)});
     for (const std::uint32_t t : part.source_triangle) {
-      out_.triangles.push_back({id, primitive, t, kNoTriangle, p.material});
+      out_.triangles.push_back({id, primitive, t, kSingleSided, p.material});
     }
     out_.mesh_records.push_back(std::move(part.record));
     out_.meshes.push_back(std::move(part.mesh));

@@ -26,15 +26,15 @@ struct PackOptions {
   int albedo_uv_bits = 14;    ///< of the longer axis of a mesh's range, 10..16
 };
 
-inline constexpr std::uint32_t kNoTriangle = std::numeric_limits<std::uint32_t>::max();
+inline constexpr std::uint32_t kSingleSided = std::numeric_limits<std::uint32_t>::max();
 
 /// One triangle of the packed meshes, in the order of `PackedScene::meshes` and their indices.
 struct PackedTriangle {
-  std::uint32_t mesh = 0;                  ///< into PackedScene::meshes
-  std::uint32_t primitive = 0;             ///< into Scene::primitives
-  std::uint32_t triangle = 0;              ///< of the primitive
-  std::uint32_t other_side = kNoTriangle;  ///< the packed triangle on the back of this one
-  int material = 0;                        ///< into Scene::materials
+  std::uint32_t mesh = 0;                   ///< into PackedScene::meshes
+  std::uint32_t primitive = 0;              ///< into Scene::primitives
+  std::uint32_t triangle = 0;               ///< of the primitive
+  std::uint32_t other_side = kSingleSided;  ///< the packed triangle on the back of this one
+  int material = 0;                         ///< into Scene::materials
 };
 
 struct PackedMeshSource {

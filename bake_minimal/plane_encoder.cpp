@@ -44,8 +44,6 @@ void store(const TileCopy& tile, const SampleTarget& target) {
   }
 }
 
-int padded(int side) { return (side + 15) & ~15; }
-
 VideoSettings mantissa_settings(const LayerRecord& record, const CodingOptions& o) {
   VideoSettings s;
   s.codec = record.codec;
@@ -232,8 +230,8 @@ Status PlaneEncoder::quantise_tile(LayerState& layer, std::size_t tile,
     }
     const int shift = quantiser_.halved(c) ? 1 : 0;
     store({layer.samples, (rect.width + shift) >> shift, (rect.height + shift) >> shift,
-           rect.x >> shift, rect.y >> shift, padded(rect.width) >> shift,
-           padded(rect.height) >> shift},
+           rect.x >> shift, rect.y >> shift, padded_side(rect.width) >> shift,
+           padded_side(rect.height) >> shift},
           layer.mantissas->target(c));
   }
   return {};

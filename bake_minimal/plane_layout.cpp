@@ -28,8 +28,6 @@ struct Tiling {
   int rows = 1;
 };
 
-int padded(int side) { return (side + 15) & ~15; }
-
 Tiling tiling_of(int tiles, int tile_width, Layout layout, int order) {
   if (layout == Layout::kGrid) return {order + 1, order + 1};
   Tiling tiling;
@@ -63,9 +61,9 @@ Result<LayerPlan> plan_layer(std::vector<int> coefficients, int order, int width
   LayerPlan plan;
   LayerRecord& record = plan.record;
   const Tiling tiling =
-      tiling_of(static_cast<int>(coefficients.size()), padded(width), o.layout, order);
-  const int coded_width = tiling.columns * padded(width);
-  const int coded_height = tiling.rows * padded(height);
+      tiling_of(static_cast<int>(coefficients.size()), padded_side(width), o.layout, order);
+  const int coded_width = tiling.columns * padded_side(width);
+  const int coded_height = tiling.rows * padded_side(height);
   if (coded_width > static_cast<int>(limits::kVideoSide) ||
       coded_height > static_cast<int>(limits::kVideoSide)) {
     return fail(ErrorCode::kLimit,
@@ -94,8 +92,8 @@ Result<LayerPlan> plan_layer(std::vector<int> coefficients, int order, int width
     for (int c = 0; c < component_count(basis); ++c) {
       PlaneRecord plane;
       plane.component = static_cast<std::uint8_t>(c);
-      plane.mantissa_rect =
-          tile_rect(static_cast<int>(i), tiling, padded(width), padded(height), width, height);
+      plane.mantissa_rect = tile_rect(static_cast<int>(i), tiling, padded_side(width),
+                                      padded_side(height), width, height);
       if (record.has_exponents) {
         plane.exponent_rect =
             tile_rect(static_cast<int>(i), tiling, blocks_x, blocks_y, blocks_x, blocks_y);

@@ -27,6 +27,9 @@ enum class Basis : std::uint8_t { kYCoCg, kGbr, kLuma };
 [[nodiscard]] std::array<double, 3> to_components(Basis basis, const std::array<double, 3>& rgb);
 [[nodiscard]] std::array<double, 3> to_rgb(Basis basis, const std::array<double, 3>& components);
 
+/// A picture's side in whole macroblocks of 16 pixels.
+[[nodiscard]] constexpr int padded_side(int side) { return (side + 15) & ~15; }
+
 /// One layer before it is coded. `record` lacks scales and private data of the codecs.
 struct LayerPlan {
   container::LayerRecord record;

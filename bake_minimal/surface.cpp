@@ -29,7 +29,7 @@ glm::vec4 texel(const Image& image, int x, int y) {
   return {table[p[0]], table[p[1]], table[p[2]], static_cast<float>(p[3]) / 255.0f};
 }
 
-glm::vec4 sample(const Image& image, glm::vec2 uv, const Surface& surface) {
+glm::vec4 sample(const Image& image, glm::vec2 uv, const HitSurface& surface) {
   // Coordinates beyond ±1e6 have no texel to speak of, and would overflow the integers.
   uv = glm::clamp(uv, glm::vec2(-1e6f), glm::vec2(1e6f));
   uv.x -= surface.wrap_u == container::Wrap::kRepeat ? std::floor(uv.x) : 0.0f;
@@ -53,7 +53,7 @@ glm::vec4 sample(const Image& image, glm::vec2 uv, const Surface& surface) {
 
 }  // namespace
 
-glm::vec4 surface_albedo(const Surface& surface, glm::vec2 uv, glm::vec4 color) {
+glm::vec4 surface_albedo(const HitSurface& surface, glm::vec2 uv, glm::vec4 color) {
   glm::vec4 albedo = surface.base_color * color;
   if (surface.image != nullptr) albedo *= sample(*surface.image, uv, surface);
   return glm::clamp(albedo, glm::vec4(0.0f), glm::vec4(1.0f));

@@ -181,7 +181,7 @@ void TransferTracer::Impl::prepare_triangles() {
 }
 
 glm::vec4 TransferTracer::Impl::albedo_at(std::uint32_t triangle, float b1, float b2) const {
-  const Surface& surface = geometry.surfaces[geometry.surface[triangle]];
+  const HitSurface& surface = geometry.surfaces[geometry.surface[triangle]];
   const glm::vec4 color =
       geometry.colors.empty() ? glm::vec4(1.0f) : interpolate(geometry.colors, triangle, b1, b2);
   const glm::vec2 uv = surface.image != nullptr ? interpolate(geometry.albedo_uv, triangle, b1, b2)

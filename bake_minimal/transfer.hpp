@@ -17,7 +17,7 @@ inline constexpr std::uint32_t kNoOtherSide = 0xffffffffu;
 
 /// What a ray needs to know of a surface it hits: its albedo as the player will see it. The image
 /// is borrowed.
-struct Surface {
+struct HitSurface {
   glm::vec4 base_color{1.0f};  ///< linear, straight alpha
   const Image* image = nullptr;
   container::Wrap wrap_u = container::Wrap::kRepeat;
@@ -37,7 +37,7 @@ struct TraceGeometry {
   std::vector<glm::vec2> lightmap_uv;     ///< per vertex
   std::vector<glm::vec2> albedo_uv;       ///< per vertex, transformed
   std::vector<glm::vec4> colors;          ///< per vertex; may be empty
-  std::vector<Surface> surfaces;
+  std::vector<HitSurface> surfaces;
 };
 
 struct TransferOptions {
@@ -56,7 +56,7 @@ struct TransferOptions {
 [[nodiscard]] std::vector<glm::vec3> sphere_directions(int count, std::uint64_t seed);
 
 /// Linear albedo and alpha of a surface at texture coordinates.
-[[nodiscard]] glm::vec4 surface_albedo(const Surface& surface, glm::vec2 uv, glm::vec4 color);
+[[nodiscard]] glm::vec4 surface_albedo(const HitSurface& surface, glm::vec2 uv, glm::vec4 color);
 
 /// Traces transfer vectors (Fatahalian, appendix A with the errata): for unit albedo at the texel,
 ///

@@ -31,7 +31,7 @@ constexpr double kGoodFill = 0.72;
 constexpr double kSmallChart = 6;         // texels a side
 constexpr double kLeastShapeFill = 0.35;  // of the bounding rectangle, after a union
 
-FlattenLimits cut_limits(const Surface& surface, const PackOptions& options) {
+FlattenLimits cut_limits(const Surface& surface, const ChartPackOptions& options) {
   double area = 0;
   for (const double a : surface.areas) area += a;
   const double texels = double{kExpectedFill} * options.width * options.height;
@@ -164,7 +164,7 @@ class Merger {
 // coarse grid.
 class Trimmer {
  public:
-  Trimmer(const Surface& surface, const FlattenLimits& limits, const PackOptions& options)
+  Trimmer(const Surface& surface, const FlattenLimits& limits, const ChartPackOptions& options)
       : surface_(surface), limits_(limits), options_(options) {
     const int larger = std::max(options.width, options.height);
     options_.greatest_grid = std::min(larger, kTrialGrid);
@@ -235,12 +235,12 @@ class Trimmer {
 
   const Surface& surface_;
   const FlattenLimits& limits_;
-  PackOptions options_;
+  ChartPackOptions options_;
 };
 
 // Charts with a texel that two of their own triangles own, at the baked size.
 std::vector<bool> self_overlapping(std::span<const FlatChart> charts, std::span<const glm::vec2> uv,
-                                   const PackOptions& options) {
+                                   const ChartPackOptions& options) {
   std::vector<std::uint32_t> owner(
       static_cast<std::size_t>(options.width) * static_cast<std::size_t>(options.height),
       kNoTriangle);
@@ -324,7 +324,7 @@ void place_degenerate(const Surface& surface, std::vector<glm::vec2>& uv) {
 
 }  // namespace
 
-std::vector<FlatChart> make_charts(const Surface& surface, const PackOptions& options) {
+std::vector<FlatChart> make_charts(const Surface& surface, const ChartPackOptions& options) {
   const FlattenLimits limits = cut_limits(surface, options);
   std::vector<FlatChart> charts;
   for (auto& patch : grow_patches(surface)) {
@@ -353,7 +353,7 @@ glm::vec2 snap_uv(const glm::dvec2& uv) {
 
 std::vector<glm::vec2> corner_uvs(const Surface& surface, std::span<const FlatChart> charts,
                                   std::span<const std::vector<glm::dvec2>> texels,
-                                  const PackOptions& options) {
+                                  const ChartPackOptions& options) {
   std::vector<glm::vec2> uv(3 * surface.triangles.size(), glm::vec2(0.5f));
   const glm::dvec2 size(options.width, options.height);
   for (std::size_t c = 0; c < charts.size(); ++c) {
@@ -368,7 +368,7 @@ std::vector<glm::vec2> corner_uvs(const Surface& surface, std::span<const FlatCh
   return uv;
 }
 
-Result<Unwrapped> unwrap_surface(const SurfaceInput& input, const PackOptions& options) {
+Result<Unwrapped> unwrap_surface(const SurfaceInput& input, const ChartPackOptions& options) {
   const Surface surface(input);
   std::vector<FlatChart> charts = make_charts(surface, options);
   const FlattenLimits limits = cut_limits(surface, options);

@@ -18,7 +18,7 @@ namespace relit::bake {
 /// as the union can be laid flat within tighter limits. Every triangle with area is in exactly one
 /// chart.
 [[nodiscard]] std::vector<FlatChart> make_charts(const Surface& surface,
-                                                 const PackOptions& options);
+                                                 const ChartPackOptions& options);
 
 struct Unwrapped {
   std::vector<glm::vec2> corner_uv;  ///< 3 a triangle, in [0,1], multiples of 1/65535
@@ -29,7 +29,7 @@ struct Unwrapped {
 /// rasteriser at the size asked for: no texel is owned twice. Corners of triangles without area
 /// coincide, in a neighbour's chart. Deterministic. Errors: those of pack_shapes().
 [[nodiscard]] Result<Unwrapped> unwrap_surface(const SurfaceInput& input,
-                                               const PackOptions& options);
+                                               const ChartPackOptions& options);
 
 /// To the grid of 16-bit UVs, which files hold, clamped to [0,1].
 [[nodiscard]] glm::vec2 snap_uv(const glm::dvec2& uv);
@@ -38,7 +38,7 @@ struct Unwrapped {
 [[nodiscard]] std::vector<glm::vec2> corner_uvs(const Surface& surface,
                                                 std::span<const FlatChart> charts,
                                                 std::span<const std::vector<glm::dvec2>> texels,
-                                                const PackOptions& options);
+                                                const ChartPackOptions& options);
 
 [[nodiscard]] PackShape to_shape(const FlatChart& chart);
 

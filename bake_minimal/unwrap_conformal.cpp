@@ -5,14 +5,14 @@
 #include <Eigen/SparseCholesky>
 #include <cmath>
 
+#include "bake_minimal/cross2.hpp"
+
 namespace relit::bake {
 namespace {
 
 using Matrix = Eigen::SparseMatrix<double>;
 using Solver = Eigen::SimplicialLDLT<Matrix>;
 using Triplet = Eigen::Triplet<double>;
-
-double cross2(const glm::dvec2& a, const glm::dvec2& b) { return a.x * b.y - a.y * b.x; }
 
 // Half the cotangent of the angle at corner i: the weight of the opposite edge.
 double half_cotangent(const std::array<glm::dvec2, 3>& p, std::size_t i) {

@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <numeric>
 #include <unordered_map>
 
+#include "bake_minimal/cross2.hpp"
 #include "bake_minimal/texel_raster.hpp"
 #include "bake_minimal/unwrap_conformal.hpp"
 
@@ -13,15 +15,12 @@ namespace relit::bake {
 namespace {
 
 constexpr double kPlaneCosine = 1 - 1e-6;
-constexpr double kPi = 3.14159265358979323846;
 // A disc's inner angle defects sum to its total curvature: beyond this (a hemisphere has 2π) no
 // flat image keeps to the limits.
 constexpr double kGreatestCurvature = 5.0;
 constexpr int kRigidSteps = 12;
 constexpr int kLeastOverlapSide = 32;
 constexpr int kGreatestOverlapSide = 512;
-
-double cross2(const glm::dvec2& a, const glm::dvec2& b) { return a.x * b.y - a.y * b.x; }
 
 class UnionFind {
  public:
@@ -160,7 +159,7 @@ class Flattener {
     const std::int64_t euler = static_cast<std::int64_t>(mesh_.vertex_count) - edges + faces;
     if (euler > 1) return false;
     if (euler < 1) return true;
-    std::vector<double> defect(mesh_.vertex_count, 2 * kPi);
+    std::vector<double> defect(mesh_.vertex_count, 2 * std::numbers::pi);
     std::vector<bool> on_border(mesh_.vertex_count, false);
     mark_border(on_border);
     for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) {

@@ -5,12 +5,11 @@
 #include <cmath>
 #include <map>
 
+#include "bake_minimal/cross2.hpp"
 #include "bake_minimal/texel_raster.hpp"
 
 namespace relit::bake {
 namespace {
-
-double cross2(const glm::dvec2& a, const glm::dvec2& b) { return a.x * b.y - a.y * b.x; }
 
 struct Crossing {
   int row;

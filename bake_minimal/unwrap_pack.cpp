@@ -3,10 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <numeric>
 #include <optional>
 #include <set>
 
+#include "bake_minimal/cross2.hpp"
 #include "bake_minimal/unwrap_footprint.hpp"
 
 namespace relit::bake {
@@ -17,7 +19,6 @@ constexpr std::size_t kGreatestNested = 3000;
 constexpr int kSearchSteps = 10;
 constexpr double kScaleTolerance = 1.004;
 constexpr std::size_t kFewShapes = 16;
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kOpen = 1e-6;
 
 // The cells of a shape at its place in the corner of the grid: those it covers, which keep the
@@ -39,9 +40,9 @@ using Candidates = std::vector<std::optional<Placed>>;
 
 // Occupied cells; knows for every cell the nearest occupied one at or before it in its row, so that
 // a run is tested, and the place beyond an obstacle found, in one look.
-class Grid {
+class Occupancy {
  public:
-  explicit Grid(glm::ivec2 size)
+  explicit Occupancy(glm::ivec2 size)
       : size_(size),
         last_(static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y), -1),
         gap_(static_cast<std::size_t>(size.y), size.x) {}
@@ -84,7 +85,7 @@ class Grid {
 
 // The first x from `x` on at which no run meets an occupied cell, as far as this pass saw; equal to
 // x when none does.
-int next_free(const Grid& grid, const std::vector<CellRun>& runs, int x, int y) {
+int next_free(const Occupancy& grid, const std::vector<CellRun>& runs, int x, int y) {
   int next = x;
   for (const CellRun& run : runs) {
     const int hit = grid.last_occupied(next + run.last, y + run.row);
@@ -93,11 +94,9 @@ int next_free(const Grid& grid, const std::vector<CellRun>& runs, int x, int y) 
   return next;
 }
 
-double cross2(const glm::dvec2& a, const glm::dvec2& b) { return a.x * b.y - a.y * b.x; }
-
 class Packer {
  public:
-  Packer(std::span<const PackShape> shapes, const PackOptions& options)
+  Packer(std::span<const PackShape> shapes, const ChartPackOptions& options)
       : shapes_(shapes), options_(options) {
     const int larger = std::max(options.width, options.height);
     while (larger > options.greatest_grid * unit_) unit_ *= 2;
@@ -114,9 +113,9 @@ class Packer {
                       : shapes.size() <= 4 * kFewShapes ? 2
                                                         : 1;
     for (int k = 1; k < finer; ++k) {
-      const double angle = kPi / 2 * k / finer;
+      const double angle = std::numbers::pi / 2 * k / finer;
       for (int quarter = 0; quarter < 4; ++quarter) {
-        const double a = angle + quarter * kPi / 2;
+        const double a = angle + quarter * std::numbers::pi / 2;
         turns_.emplace_back(std::cos(a), std::sin(a));
       }
     }
@@ -309,7 +308,7 @@ class Packer {
 
   std::optional<std::vector<Placed>> place_all(const std::vector<Candidates>& turned,
                                                const std::vector<std::size_t>& order) const {
-    Grid covered(grid_size_), read(grid_size_);
+    Occupancy covered(grid_size_), read(grid_size_);
     std::vector<Placed> placed(turned.size());
     for (const std::size_t i : order) {
       if (!place(turned[i], covered, read, placed[i])) return std::nullopt;
@@ -343,7 +342,7 @@ class Packer {
   }
 
   // The lowest place, then the leftmost, over all turns.
-  bool place(const Candidates& turned, Grid& covered, Grid& read, Placed& out) const {
+  bool place(const Candidates& turned, Occupancy& covered, Occupancy& read, Placed& out) const {
     int best_top = std::numeric_limits<int>::max();
     glm::ivec2 best_at(0);
     const Placed* best = nullptr;
@@ -379,7 +378,7 @@ class Packer {
     return true;
   }
 
-  int first_free(const Footprint& f, const Grid& covered, const Grid& read, int y) const {
+  int first_free(const Footprint& f, const Occupancy& covered, const Occupancy& read, int y) const {
     int x = 0;
     while (x + f.size.x <= grid_size_.x) {
       const int a = next_free(covered, f.covered, x, y);
@@ -395,7 +394,7 @@ class Packer {
   }
 
   std::span<const PackShape> shapes_;
-  const PackOptions& options_;
+  const ChartPackOptions& options_;
   int unit_ = 1;  // texels a cell
   glm::ivec2 grid_size_{0};
   std::vector<std::vector<OutlineEdge>> outlines_;  // by shape
@@ -407,12 +406,12 @@ class Packer {
 
 }  // namespace
 
-Result<PackResult> pack_shapes(std::span<const PackShape> shapes, const PackOptions& options) {
+Result<PackResult> pack_shapes(std::span<const PackShape> shapes, const ChartPackOptions& options) {
   if (shapes.empty()) return PackResult{1.0, {}};
   return Packer(shapes, options).run();
 }
 
-bool shapes_fit(std::span<const PackShape> shapes, const PackOptions& options, double scale) {
+bool shapes_fit(std::span<const PackShape> shapes, const ChartPackOptions& options, double scale) {
   return Packer(shapes, options).fits(scale);
 }
 

@@ -18,7 +18,7 @@ struct PackShape {
   std::vector<std::array<std::uint32_t, 3>> triangles;
 };
 
-struct PackOptions {
+struct ChartPackOptions {
   int width = 128;  ///< texels
   int height = 128;
   int gutter = 2;           ///< empty texels between texels covered by different shapes, at least
@@ -39,10 +39,10 @@ struct PackResult {
 /// the search starts from what their bounding rectangles reach (stb_rect_pack). Deterministic.
 /// Errors: kLimit when there are more shapes than the size has room for.
 [[nodiscard]] Result<PackResult> pack_shapes(std::span<const PackShape> shapes,
-                                             const PackOptions& options);
+                                             const ChartPackOptions& options);
 
 /// Whether shapes fit at a scale (texels per unit), as the search above would try it.
-[[nodiscard]] bool shapes_fit(std::span<const PackShape> shapes, const PackOptions& options,
+[[nodiscard]] bool shapes_fit(std::span<const PackShape> shapes, const ChartPackOptions& options,
                               double scale);
 
 /// Rectangles in whole cells. False when they do not all fit; `at` are their lower corners.

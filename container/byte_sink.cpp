@@ -8,17 +8,14 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdlib>
-#include <system_error>
 #include <utility>
+
+#include "container/base/system_failure.hpp"
 
 namespace relit::container {
 namespace {
 
 constexpr std::size_t kBufferBytes = std::size_t{1} << 18;
-
-Unexpected system_failure(const std::string& doing, int error) {
-  return fail(ErrorCode::kIo, doing + ": " + std::generic_category().message(error));
-}
 
 std::string directory_of(const std::string& path) {
   const auto slash = path.find_last_of('/');

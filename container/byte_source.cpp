@@ -9,14 +9,11 @@
 #include <cerrno>
 #include <cstring>
 #include <limits>
-#include <system_error>
+
+#include "container/base/system_failure.hpp"
 
 namespace relit::container {
 namespace {
-
-Unexpected system_failure(const std::string& doing, int error) {
-  return fail(ErrorCode::kIo, doing + ": " + std::generic_category().message(error));
-}
 
 /// What a host's callback means by a negative number.
 Unexpected host_failure(const std::string& doing, std::int64_t code) {

@@ -25,6 +25,8 @@ inline constexpr std::array<std::uint8_t, 16> kSegmentMarker{
 inline constexpr std::size_t kRecordHeaderBytes = 24;
 inline constexpr std::size_t kRecordAlignment = 8;
 inline constexpr std::size_t kEndPayloadBytes = 24;
+/// A reader gives a payload buffer beyond this back after use.
+inline constexpr std::size_t kKeptPayloadBytes = std::size_t{1} << 24;
 /// A segment record of limits::kChunksPerSegment chunks and limits::kFramesPerSegment durations.
 inline constexpr std::size_t kMostSegmentPayloadBytes =
     52 + 16 * limits::kChunksPerSegment + 4 * limits::kFramesPerSegment;

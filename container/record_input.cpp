@@ -15,8 +15,6 @@ constexpr std::size_t kScanBytes = std::size_t{1} << 16;
 /// How often, on the average, a byte may be gone over again.
 constexpr std::uint64_t kMostRewound = 8;
 constexpr std::size_t kCandidateBytes = kRecordHeaderBytes + kSegmentMarker.size();
-/// A payload buffer beyond this is given back after use.
-constexpr std::size_t kKeptBytes = std::size_t{1} << 24;
 
 Error truncated(std::uint64_t wanted, std::uint64_t got) {
   return {ErrorCode::kTruncated,
@@ -142,7 +140,7 @@ Result<std::span<const std::uint8_t>> RecordInput::payload() {
   header_.reset();
   const auto size = static_cast<std::size_t>(header.payload_bytes);
   const std::size_t total = size + padding_after(size);
-  if (payload_.size() > kKeptBytes) payload_ = {};
+  if (payload_.size() > kKeptPayloadBytes) payload_ = {};
   std::size_t done = 0;
   const auto suspect = [&] {
     suspect_.assign(header_bytes_.begin(), header_bytes_.end());

@@ -9,8 +9,6 @@ namespace relit::container {
 namespace {
 
 constexpr std::size_t kWindowBytes = std::size_t{1} << 16;
-/// A payload buffer beyond this is given back after use.
-constexpr std::size_t kKeptBytes = std::size_t{1} << 24;
 /// How often, on the average, a byte may be gone over again.
 constexpr std::uint64_t kMostSearched = 8;
 
@@ -98,7 +96,7 @@ Result<bool> RecordScan::read_payload(const FoundRecord& record) {
   const auto size = static_cast<std::size_t>(record.header.payload_bytes);
   const std::size_t wanted = size + padding_after(size);
   const auto total = static_cast<std::size_t>(std::min<std::uint64_t>(wanted, size_ - begin));
-  if (payload_.capacity() > kKeptBytes) payload_ = {};
+  if (payload_.capacity() > kKeptPayloadBytes) payload_ = {};
   payload_.resize(total);
   std::size_t done = 0;
   RELIT_ASSIGN(const auto near, window(begin, std::min(total, kWindowBytes)));

@@ -163,6 +163,7 @@ Result<Bytes> stored_private(std::string_view codec, std::span<const std::uint8_
 }
 
 Result<Bytes> stored_packet(std::string_view codec, std::span<const std::uint8_t> packet) {
+  if (packet.empty()) return corrupt("an empty packet");
   if (NalSyntax::knows(codec)) return packet_of_units(codec, packet);
   if (codec == "av1") return packet_of_obus(packet);
   return Bytes(packet.begin(), packet.end());

@@ -25,7 +25,7 @@ using Bytes = std::vector<std::uint8_t>;
 /// An encoder's packet -> a stored one. h264, hevc: NAL units after start codes of 3 or 4 bytes get
 /// a length of 4 bytes instead; parameter sets, delimiters, supplemental information and filler are
 /// left out. av1: temporal delimiters are left out, every other OBU gets its size. Errors: kCorrupt
-/// where there are no units, or nothing of a picture among them.
+/// for an empty packet, and where there are no units, or nothing of a picture among them.
 [[nodiscard]] Result<Bytes> stored_packet(std::string_view codec,
                                           std::span<const std::uint8_t> packet);
 

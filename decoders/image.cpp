@@ -38,7 +38,7 @@ constexpr std::array kSignatures{
     Signature{0, "BM"sv, "image/bmp"},
 };
 
-struct Size {
+struct StatedSize {
   std::int64_t width = 0;
   std::int64_t height = 0;
 };
@@ -56,8 +56,8 @@ Unexpected truncated(std::string_view media_type) {
 }
 
 // The chunks are walked here because libavcodec returns the rows it has when the rest is missing.
-Result<Size> check_png(std::span<const std::uint8_t> bytes) {
-  Size size;
+Result<StatedSize> check_png(std::span<const std::uint8_t> bytes) {
+  StatedSize size;
   std::size_t at = 8;
   while (bytes.size() - at >= 12) {
     const std::uint64_t length = big_endian(bytes.subspan(at), 4);
@@ -73,8 +73,8 @@ Result<Size> check_png(std::span<const std::uint8_t> bytes) {
 }
 
 // Walks the markers up to the picture's end; entropy-coded data holds no marker but restarts.
-Result<Size> check_jpeg(std::span<const std::uint8_t> bytes) {
-  Size size;
+Result<StatedSize> check_jpeg(std::span<const std::uint8_t> bytes) {
+  StatedSize size;
   std::size_t at = 2;
   while (at + 1 < bytes.size()) {
     if (bytes[at] != 0xff || bytes[at + 1] == 0xff || bytes[at + 1] == 0 ||
@@ -97,7 +97,7 @@ Result<Size> check_jpeg(std::span<const std::uint8_t> bytes) {
   return truncated("image/jpeg");
 }
 
-Status check_size(const Size& size) {
+Status check_size(const StatedSize& size) {
   const auto side = static_cast<std::int64_t>(limits::kImageSide);
   const auto texels = static_cast<std::int64_t>(limits::kImageTexels);
   if (size.width < 1 || size.height < 1) {
@@ -198,7 +198,7 @@ Result<DecodedImage> to_rgba(const AVFrame& frame) {
 }
 
 // `media_type`, what the container claims, is for the message alone.
-Result<Size> checked_size(std::span<const std::uint8_t> bytes, std::string_view media_type) {
+Result<StatedSize> checked_size(std::span<const std::uint8_t> bytes, std::string_view media_type) {
   const std::string_view type = image_media_type(bytes);
   if (type != "image/png" && type != "image/jpeg") {
     const std::string_view told = type.empty() ? media_type : type;
@@ -209,7 +209,7 @@ Result<Size> checked_size(std::span<const std::uint8_t> bytes, std::string_view 
   if (bytes.size() > INT_MAX - AV_INPUT_BUFFER_PADDING_SIZE) {
     return fail(ErrorCode::kLimit, "the picture has 2 GiB or more; scale it down");
   }
-  RELIT_ASSIGN(const Size size, type == "image/png" ? check_png(bytes) : check_jpeg(bytes));
+  RELIT_ASSIGN(const StatedSize size, type == "image/png" ? check_png(bytes) : check_jpeg(bytes));
   RELIT_TRY(check_size(size));
   return size;
 }
@@ -241,7 +241,7 @@ std::string_view image_media_type(std::span<const std::uint8_t> bytes) {
 }
 
 Result<ImageSize> image_size(std::span<const std::uint8_t> bytes) {
-  RELIT_ASSIGN(const Size size, checked_size(bytes, {}));
+  RELIT_ASSIGN(const StatedSize size, checked_size(bytes, {}));
   return ImageSize{static_cast<int>(size.width), static_cast<int>(size.height)};
 }
 

@@ -112,27 +112,27 @@ std::int64_t read_frame_buffering(BitReader& r) {
 
 /// Table A-1: the picture buffer in macroblocks.
 std::uint64_t buffer_macroblocks(int level) {
-  struct Row {
+  struct Buffer {
     int level;
     std::uint64_t macroblocks;
   };
-  constexpr std::array<Row, 13> kRows = {{{10, 396},
-                                          {11, 900},
-                                          {20, 2376},
-                                          {21, 4752},
-                                          {30, 8100},
-                                          {31, 18000},
-                                          {32, 20480},
-                                          {41, 32768},
-                                          {42, 34816},
-                                          {50, 110400},
-                                          {52, 184320},
-                                          {59, 184320},
-                                          {62, 696320}}};
-  for (const Row& row : kRows) {
+  constexpr std::array<Buffer, 13> kBuffers = {{{10, 396},
+                                                {11, 900},
+                                                {20, 2376},
+                                                {21, 4752},
+                                                {30, 8100},
+                                                {31, 18000},
+                                                {32, 20480},
+                                                {41, 32768},
+                                                {42, 34816},
+                                                {50, 110400},
+                                                {52, 184320},
+                                                {59, 184320},
+                                                {62, 696320}}};
+  for (const Buffer& row : kBuffers) {
     if (level <= row.level) return row.macroblocks;
   }
-  return kRows.back().macroblocks;
+  return kBuffers.back().macroblocks;
 }
 
 }  // namespace

@@ -13,7 +13,7 @@
 namespace relit::gles {
 namespace {
 
-constexpr std::string_view kPosition[] = {"a_position"};
+constexpr std::string_view kBackgroundAttributes[] = {"a_position"};
 
 // The eight-bit form: bytes are roots of values over their texel's largest, which is in alpha. The
 // most that it holds is kRootRange², in means of the environment.
@@ -60,13 +60,6 @@ Result<BackgroundRenderer> BackgroundRenderer::create(const Device& device) {
   BackgroundRenderer renderer;
   renderer.device_ = &device;
   renderer.half_float_ = device.caps().half_float_texture && device.caps().half_float_linear;
-  StateGuard guard(device);
-  const std::string_view vertex[] = {shaders::present_vert};
-  const std::string_view fragment[] = {shaders::dither, shaders::gradient_frag};
-  RELIT_ASSIGN(renderer.gradient_, build_program(device.gl(), device.profile(),
-                                                 {"gradient", "", vertex, fragment, kPosition}));
-  renderer.gradient_top_ = device.gl().GetUniformLocation(renderer.gradient_.name(), "u_top");
-  renderer.gradient_bottom_ = device.gl().GetUniformLocation(renderer.gradient_.name(), "u_bottom");
   return renderer;
 }
 
@@ -126,8 +119,10 @@ Texture BackgroundRenderer::upload(const CubeMap& cube) const {
   const TextureFormat format = half_float_ ? half_float_format(*device_) : TextureFormat{};
   std::vector<std::uint16_t> halves(half_float_ ? 4 * texels : 0);
   std::vector<std::uint8_t> bytes(half_float_ ? 0 : 4 * texels);
-  for (std::size_t face = 0; face < 6; ++face) {
-    const float* rgb = cube.rgb.data() + 3 * texels * face;
+  std::vector<float> face_rgb(3 * texels);
+  for (int face = 0; face < 6; ++face) {
+    cube.write(face, face_rgb);
+    const float* rgb = face_rgb.data();
     for (std::size_t i = 0; i < texels; ++i) {
       if (half_float_) {
         for (std::size_t c = 0; c < 3; ++c) halves[4 * i + c] = to_half(rgb[3 * i + c]);
@@ -146,6 +141,16 @@ Texture BackgroundRenderer::upload(const CubeMap& cube) const {
   return texture;
 }
 
+Status BackgroundRenderer::make_gradient() {
+  const std::string_view vertex[] = {shaders::present_vert};
+  const std::string_view fragment[] = {shaders::dither, shaders::gradient_frag};
+  RELIT_ASSIGN(gradient_, build_program(device_->gl(), device_->profile(),
+                                        {"gradient", "", vertex, fragment, kBackgroundAttributes}));
+  gradient_top_ = device_->gl().GetUniformLocation(gradient_.name(), "u_top");
+  gradient_bottom_ = device_->gl().GetUniformLocation(gradient_.name(), "u_bottom");
+  return {};
+}
+
 Result<BackgroundRenderer::SkyProgram*> BackgroundRenderer::sky_program(ToneMap tone_map) {
   SkyProgram& sky = skies_[static_cast<std::size_t>(tone_map)];
   if (sky.program) return &sky;
@@ -153,8 +158,9 @@ Result<BackgroundRenderer::SkyProgram*> BackgroundRenderer::sky_program(ToneMap 
                               (half_float_ ? "" : "SHARED_ROOT 1\n");
   const std::string_view vertex[] = {shaders::background_vert};
   const std::string_view fragment[] = {shaders::dither, shaders::color, shaders::background_frag};
-  RELIT_ASSIGN(sky.program, build_program(device_->gl(), device_->profile(),
-                                          {"background", defines, vertex, fragment, kPosition}));
+  RELIT_ASSIGN(sky.program,
+               build_program(device_->gl(), device_->profile(),
+                             {"background", defines, vertex, fragment, kBackgroundAttributes}));
   const Functions& gl = device_->gl();
   sky.rays = gl.GetUniformLocation(sky.program.name(), "u_rays");
   sky.scale = gl.GetUniformLocation(sky.program.name(), "u_scale");
@@ -176,6 +182,7 @@ Status BackgroundRenderer::draw(const View& view) {
   if (kind_ == Background::Kind::kTransparent) return {};
   if (kind_ == Background::Kind::kEnvironment || kind_ == Background::Kind::kHarmonics)
     return draw_sky(view);
+  if (!gradient_) RELIT_TRY(make_gradient());
   gl.UseProgram(gradient_.name());
   gl.Uniform4f(gradient_top_, top_[0], top_[1], top_[2], 1);
   gl.Uniform4f(gradient_bottom_, bottom_[0], bottom_[1], bottom_[2], 1);

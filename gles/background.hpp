@@ -55,6 +55,7 @@ class BackgroundRenderer {
     GLint scale = -1;
   };
   Result<SkyProgram*> sky_program(ToneMap tone_map);
+  Status make_gradient();
   Texture upload(const CubeMap& cube) const;
   Status draw_sky(const View& view);
 
@@ -66,7 +67,7 @@ class BackgroundRenderer {
   Texture cube_;
   float cube_scale_ = 1;
   std::array<SkyProgram, 3> skies_;  // by tone map, compiled when first used
-  Program gradient_;
+  Program gradient_;                 // likewise
   GLint gradient_top_ = -1, gradient_bottom_ = -1;
 };
 

@@ -36,7 +36,13 @@ Result<std::unique_ptr<CharacterRenderer>> CharacterRenderer::create(const Devic
 
 Status CharacterRenderer::set_materials(std::span<const ImageView> images,
                                         std::span<const MaterialView> materials) {
-  RELIT_ASSIGN(materials_, MaterialTextures::create(device_, images, materials));
+  return set_materials(
+      images.size(), [&](std::size_t i) { return std::optional(images[i]); }, materials);
+}
+
+Status CharacterRenderer::set_materials(std::size_t image_count, const ImageLoader& load,
+                                        std::span<const MaterialView> materials) {
+  RELIT_ASSIGN(materials_, MaterialTextures::create(device_, image_count, load, materials));
   return {};
 }
 

@@ -42,6 +42,9 @@ class CharacterRenderer {
   /// Replaces all materials. The images can go when it returns. On failure the old ones stay.
   /// Errors: kInvalid, kOutOfMemory, kEnvironment.
   Status set_materials(std::span<const ImageView> images, std::span<const MaterialView> materials);
+  /// The same of images that are loaded one at a time; see MaterialTextures::create().
+  Status set_materials(std::size_t image_count, const ImageLoader& load,
+                       std::span<const MaterialView> materials);
 
   /// Replaces all meshes; their positions are then unknown and they are not drawn until they are
   /// given. What the views point to can go when it returns. Errors: kInvalid for counts that

@@ -11,56 +11,64 @@ namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
 
+float clean(float value) { return std::isfinite(value) && value > 0 ? value : 0.0f; }
+
+// A picture reduced to width × height: means over the area of the smaller picture's pixels, so that
+// small bright sources keep their power. They are taken when they are asked for, until they are
+// kept.
 struct Equirect {
   int width = 0;
   int height = 0;
+  EnvironmentView source;
   std::vector<glm::vec3> texels;
-  [[nodiscard]] const glm::vec3& at(int x, int y) const {
+
+  [[nodiscard]] glm::vec3 at(int x, int y) const {
+    if (texels.empty()) return mean(x, y);
     return texels[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
                   static_cast<std::size_t>(x)];
   }
   // Beyond a pole lies the row on its other side.
-  [[nodiscard]] const glm::vec3& across(int x, int y) const {
+  [[nodiscard]] glm::vec3 across(int x, int y) const {
     if (y < 0 || y >= height) {
       y = y < 0 ? -1 - y : 2 * height - 1 - y;
       x += width / 2;
     }
     return at((x % width + width) % width, std::clamp(y, 0, height - 1));
   }
-};
-
-float clean(float value) { return std::isfinite(value) && value > 0 ? value : 0.0f; }
-
-// Means over the area of the smaller picture's pixels, so that small bright sources keep their
-// power.
-Equirect shrink(const EnvironmentView& source, int width, int height) {
-  Equirect out{width, height, {}};
-  out.texels.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
-  for (int y = 0; y < height; ++y) {
-    const int y0 = static_cast<int>(std::int64_t{y} * source.height / height);
-    const int y1 = std::max(y0 + 1, static_cast<int>(std::int64_t{y + 1} * source.height / height));
-    for (int x = 0; x < width; ++x) {
-      const int x0 = static_cast<int>(std::int64_t{x} * source.width / width);
-      const int x1 = std::max(x0 + 1, static_cast<int>(std::int64_t{x + 1} * source.width / width));
-      glm::vec3 sum(0.0f);
-      float weight = 0;
-      for (int j = y0; j < y1; ++j) {
-        const float row =
-            std::sin(kPi * (static_cast<float>(j) + 0.5f) / static_cast<float>(source.height));
-        for (int i = x0; i < x1; ++i) {
-          const float* p = source.rgb.data() + 3 * (static_cast<std::size_t>(j) *
-                                                        static_cast<std::size_t>(source.width) +
-                                                    static_cast<std::size_t>(i));
-          sum += row * glm::vec3(clean(p[0]), clean(p[1]), clean(p[2]));
-          weight += row;
-        }
-      }
-      out.texels[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
-                 static_cast<std::size_t>(x)] = sum / weight;
-    }
+  [[nodiscard]] glm::vec3 pixel(int x, int y) const {
+    const float* p = source.rgb.data() +
+                     3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(source.width) +
+                          static_cast<std::size_t>(x));
+    return {clean(p[0]), clean(p[1]), clean(p[2])};
   }
-  return out;
-}
+  [[nodiscard]] glm::vec3 mean(int x, int y) const {
+    const auto begin = [](int i, int of, int from) {
+      return static_cast<int>(std::int64_t{i} * from / of);
+    };
+    const int x0 = begin(x, width, source.width), y0 = begin(y, height, source.height);
+    const int x1 = std::max(x0 + 1, begin(x + 1, width, source.width));
+    const int y1 = std::max(y0 + 1, begin(y + 1, height, source.height));
+    if (x1 == x0 + 1 && y1 == y0 + 1) return pixel(x0, y0);
+    glm::vec3 sum(0.0f);
+    float weight = 0;
+    for (int j = y0; j < y1; ++j) {
+      const float row =
+          std::sin(kPi * (static_cast<float>(j) + 0.5f) / static_cast<float>(source.height));
+      for (int i = x0; i < x1; ++i) {
+        sum += row * pixel(i, j);
+        weight += row;
+      }
+    }
+    return sum / weight;
+  }
+  void keep() {
+    std::vector<glm::vec3> kept;
+    kept.reserve(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width; ++x) kept.push_back(mean(x, y));
+    texels = std::move(kept);
+  }
+};
 
 // exp((d·d' - 1)/σ²), the Gaussian's like on the sphere, over the pixels' solid angles. Its weights
 // depend on the two rows and the distance between the columns only.
@@ -113,24 +121,31 @@ glm::vec3 lookup(const Equirect& map, const glm::vec3& direction) {
          fy * ((1 - fx) * map.across(x0, y0 + 1) + fx * map.across(x0 + 1, y0 + 1));
 }
 
+// The mean is taken of some texels only where there are many.
 template <class Radiance>
-CubeMap fill_cube(int side, const Radiance& radiance) {
+CubeMap cube_of(int side, Radiance radiance) {
+  const int step = side >= 128 ? 4 : 1;
+  double sum = 0;
+  std::int64_t count = 0;
+  for (int face = 0; face < 6; ++face)
+    for (int y = 0; y < side; y += step)
+      for (int x = 0; x < side; x += step, count += 3) {
+        const glm::vec3 value = radiance(cube_direction(face, x, y, side));
+        for (int c = 0; c < 3; ++c) sum += clean(value[c]);
+      }
+  const double mean = sum / static_cast<double>(count);
   CubeMap cube;
   cube.side = side;
-  cube.rgb.reserve(18 * static_cast<std::size_t>(side) * static_cast<std::size_t>(side));
-  double sum = 0;
-  for (int face = 0; face < 6; ++face)
+  cube.scale = mean > 1e-30 ? static_cast<float>(mean) : 1.0f;
+  cube.write = [side, scale = cube.scale, radiance = std::move(radiance)](int face,
+                                                                          std::span<float> rgb) {
+    auto out = rgb.begin();
     for (int y = 0; y < side; ++y)
       for (int x = 0; x < side; ++x) {
         const glm::vec3 value = radiance(cube_direction(face, x, y, side));
-        for (int c = 0; c < 3; ++c) {
-          cube.rgb.push_back(clean(value[c]));
-          sum += cube.rgb.back();
-        }
+        for (int c = 0; c < 3; ++c) *out++ = std::min(clean(value[c]) / scale, 60000.0f);
       }
-  const double mean = sum / static_cast<double>(cube.rgb.size());
-  cube.scale = mean > 1e-30 ? static_cast<float>(mean) : 1.0f;
-  for (float& value : cube.rgb) value = std::min(value / cube.scale, 60000.0f);
+  };
   return cube;
 }
 
@@ -192,14 +207,17 @@ CubeMap make_cube_map(const EnvironmentView& environment, float blur_rad, int ma
   const int height =
       std::clamp(static_cast<int>(std::int64_t{environment.height} * width / environment.width), 1,
                  environment.height);
-  Equirect map = shrink(environment, width, height);
-  if (blur_rad > 0) blur(map, blur_rad);
+  Equirect map{width, height, environment, {}};
+  if (blur_rad > 0) {
+    map.keep();
+    blur(map, blur_rad);
+  }
   const int side = std::clamp(width / 4, 2, max_side);
-  return fill_cube(side, [&](const glm::vec3& d) { return lookup(map, d); });
+  return cube_of(side, [map = std::move(map)](const glm::vec3& d) { return lookup(map, d); });
 }
 
 CubeMap make_cube_map(std::span<const std::array<float, 3>> sh, int side) {
-  return fill_cube(side, [&](const glm::vec3& d) {
+  return cube_of(side, [sh](const glm::vec3& d) {
     const std::array<float, 16> y = basis(d);
     glm::vec3 sum(0.0f);
     for (std::size_t n = 0; n < std::min(sh.size(), y.size()); ++n)

@@ -10,11 +10,11 @@ namespace {
 
 // Vectors of the fragment shader's uniforms that are the material's, the sum's own or the
 // compiler's.
-constexpr int kReservedUniforms = 20;
-constexpr int kMostUnits = 16;
+constexpr int kFusedUniforms = 20;
+constexpr int kFusedUnits = 16;
 
 // Unit 1 is the material's.
-int unit_of(int sheet) { return sheet == 0 ? 0 : sheet + 1; }
+int fused_unit_of(int sheet) { return sheet == 0 ? 0 : sheet + 1; }
 
 }  // namespace
 
@@ -27,8 +27,8 @@ Result<std::unique_ptr<FusedLight>> FusedLight::create(const Device& device,
                 "composite in texture space or on the CPU");
   const Capabilities& caps = device.caps();
   PlanePass::Limits limits;
-  limits.units = std::min(caps.max_texture_units, kMostUnits) - 1;
-  limits.vectors = std::max(0, caps.max_fragment_uniform_vectors - kReservedUniforms);
+  limits.units = std::min(caps.max_texture_units, kFusedUnits) - 1;
+  limits.vectors = std::max(0, caps.max_fragment_uniform_vectors - kFusedUniforms);
   std::vector<PlanePass> passes = PlanePass::plan(description, sheets, limits);
   if (passes.size() > 1 || !passes.front().within(limits))
     return fail(ErrorCode::kUnsupported,
@@ -70,13 +70,15 @@ std::string FusedLight::text() const {
 }
 
 void FusedLight::locate(const Functions& gl, CharacterShader& shader) const {
-  shader.planes = pass_.locate(gl, shader.program, unit_of);
+  shader.planes = pass_.locate(gl, shader.program, fused_unit_of);
   shader.constant = gl.GetUniformLocation(shader.program.name(), "u_constant");
   gl.Uniform2f(gl.GetUniformLocation(shader.program.name(), "u_map_size"),
                static_cast<float>(width_), static_cast<float>(height_));
 }
 
-void FusedLight::bind(const Functions& gl) const { pass_.bind(gl, frames_, sheets_, unit_of); }
+void FusedLight::bind(const Functions& gl) const {
+  pass_.bind(gl, frames_, sheets_, fused_unit_of);
+}
 
 void FusedLight::apply(const Functions& gl, CharacterShader& shader) const {
   if (shader.fused_serial == serial_) return;

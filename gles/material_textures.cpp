@@ -43,36 +43,42 @@ Status check_material(const MaterialView& material, std::size_t index, std::size
 
 }  // namespace
 
-Result<MaterialTextures> MaterialTextures::create(const Device& device,
-                                                  std::span<const ImageView> images,
+Result<MaterialTextures> MaterialTextures::create(const Device& device, std::size_t image_count,
+                                                  const ImageLoader& load,
                                                   std::span<const MaterialView> materials) {
   RELIT_TRY(device.ready("uploading the materials' images"));
   MaterialTextures result;
   StateGuard guard(device);
-  for (std::size_t i = 0; i < images.size(); ++i) RELIT_TRY(check_image(images[i], i));
   for (std::size_t i = 0; i < materials.size(); ++i) {
-    RELIT_TRY(check_material(materials[i], i, images.size()));
-    MaterialTexture entry;
-    entry.material = materials[i];
-    if (materials[i].image >= 0) {
-      const auto twin = std::find_if(result.materials_.begin(), result.materials_.end(),
-                                     [&](const MaterialTexture& other) {
-                                       return samples_alike(other.material, materials[i]);
-                                     });
-      if (twin != result.materials_.end()) {
-        entry.texture = twin->texture;
-        entry.wrap_in_shader = twin->wrap_in_shader;
-      } else {
-        entry.texture = static_cast<int>(result.textures_.size());
-        result.textures_.push_back(
-            result.upload(device, images[static_cast<std::size_t>(materials[i].image)],
-                          materials[i], entry.wrap_in_shader));
-      }
-    }
-    result.materials_.push_back(entry);
+    RELIT_TRY(check_material(materials[i], i, image_count));
+    result.materials_.push_back({materials[i]});
   }
-  RELIT_TRY(device.check("uploading the materials' images"));
+  for (std::size_t i = 0; i < image_count; ++i) {
+    const auto shows = [&](const MaterialView& m) { return m.image == static_cast<int>(i); };
+    if (std::none_of(materials.begin(), materials.end(), shows)) continue;
+    const std::optional<ImageView> image = load(i);
+    if (!image) continue;
+    RELIT_TRY(check_image(*image, i));
+    RELIT_TRY(result.show(device, *image, static_cast<int>(i)));
+  }
   return result;
+}
+
+Status MaterialTextures::show(const Device& device, const ImageView& image, int index) {
+  for (auto entry = materials_.begin(); entry != materials_.end(); ++entry) {
+    if (entry->material.image != index) continue;
+    const auto twin = std::find_if(materials_.begin(), entry, [&](const MaterialTexture& other) {
+      return samples_alike(other.material, entry->material);
+    });
+    if (twin != entry) {
+      entry->texture = twin->texture;
+      entry->wrap_in_shader = twin->wrap_in_shader;
+      continue;
+    }
+    entry->texture = static_cast<int>(textures_.size());
+    textures_.push_back(upload(device, image, entry->material, entry->wrap_in_shader));
+  }
+  return device.check("uploading the materials' images");
 }
 
 Texture MaterialTextures::upload(const Device& device, const ImageView& image,

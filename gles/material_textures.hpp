@@ -2,6 +2,8 @@
 #pragma once
 
 #include <array>
+#include <functional>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -31,14 +33,20 @@ struct MaterialTexture {
   bool wrap_in_shader = false;  ///< the texture clamps; the shader repeats or mirrors
 };
 
+/// The image of a number, valid until the next call; none: it cannot be had, and what shows it is
+/// drawn without. So one image at a time need be in memory.
+using ImageLoader = std::function<std::optional<ImageView>(std::size_t index)>;
+
 /// Uploads the images of materials, once for every way in which they are sampled. Images beyond the
 /// maximal texture size are reduced. Where sizes that are no powers of two can neither repeat nor
 /// have mipmaps (ES 2), filtered images are enlarged to the next powers of two, and unfiltered ones
 /// keep their size and are wrapped by the shader: both look as on ES 3.
 class MaterialTextures {
  public:
-  /// Errors: kInvalid for an image or an index that makes no sense, kOutOfMemory, kEnvironment.
-  static Result<MaterialTextures> create(const Device& device, std::span<const ImageView> images,
+  /// Of `image_count` images, those that materials show are loaded, once each and in order. Errors:
+  /// kInvalid for an image or an index that makes no sense, kOutOfMemory, kEnvironment.
+  static Result<MaterialTextures> create(const Device& device, std::size_t image_count,
+                                         const ImageLoader& load,
                                          std::span<const MaterialView> materials);
 
   [[nodiscard]] const std::vector<MaterialTexture>& materials() const { return materials_; }
@@ -49,6 +57,7 @@ class MaterialTextures {
   [[nodiscard]] std::size_t gpu_bytes() const { return gpu_bytes_; }
 
  private:
+  Status show(const Device& device, const ImageView& image, int index);
   Texture upload(const Device& device, const ImageView& image, const MaterialView& material,
                  bool& wrap_in_shader);
 

@@ -11,17 +11,18 @@ namespace {
 
 using Vertex = OverlayCanvas::Vertex;
 
-constexpr GLuint kPosition = 0, kTexel = 1, kColor = 2;
+constexpr GLuint kOverlayPosition = 0, kOverlayTexel = 1, kOverlayColor = 2;
 
 void set_attributes(const Functions& gl) {
   const auto offset = [](std::size_t bytes) { return reinterpret_cast<const void*>(bytes); };
-  gl.VertexAttribPointer(kPosition, 2, GL_FLOAT, GL_FALSE, sizeof(Vertex),
+  gl.VertexAttribPointer(kOverlayPosition, 2, GL_FLOAT, GL_FALSE, sizeof(Vertex),
                          offset(offsetof(Vertex, x)));
-  gl.VertexAttribPointer(kTexel, 2, GL_UNSIGNED_SHORT, GL_FALSE, sizeof(Vertex),
+  gl.VertexAttribPointer(kOverlayTexel, 2, GL_UNSIGNED_SHORT, GL_FALSE, sizeof(Vertex),
                          offset(offsetof(Vertex, u)));
-  gl.VertexAttribPointer(kColor, 4, GL_UNSIGNED_BYTE, GL_TRUE, sizeof(Vertex),
+  gl.VertexAttribPointer(kOverlayColor, 4, GL_UNSIGNED_BYTE, GL_TRUE, sizeof(Vertex),
                          offset(offsetof(Vertex, color)));
-  for (const GLuint attribute : {kPosition, kTexel, kColor}) gl.EnableVertexAttribArray(attribute);
+  for (const GLuint attribute : {kOverlayPosition, kOverlayTexel, kOverlayColor})
+    gl.EnableVertexAttribArray(attribute);
 }
 
 }  // namespace
@@ -91,7 +92,7 @@ Status Overlay::draw(const OverlayCanvas& canvas) {
   if (device_.is_es3()) {
     gl.BindVertexArray(0);
   } else {
-    for (const GLuint attribute : {kPosition, kTexel, kColor})
+    for (const GLuint attribute : {kOverlayPosition, kOverlayTexel, kOverlayColor})
       gl.DisableVertexAttribArray(attribute);
   }
   return device_.check("drawing the overlay");

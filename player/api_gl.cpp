@@ -10,8 +10,6 @@ using namespace relit::player::api;  // NOLINT
 
 namespace {
 
-Unexpected invalid(std::string message) { return fail(ErrorCode::kInvalid, std::move(message)); }
-
 relit_view default_view() {
   relit_view view{};
   view.struct_size = sizeof view;

@@ -14,8 +14,6 @@ using namespace relit::player::api;  // NOLINT
 
 namespace {
 
-Unexpected invalid(std::string message) { return fail(ErrorCode::kInvalid, std::move(message)); }
-
 Status need_finite(double value, const char* name) {
   if (std::isfinite(value)) return {};
   return invalid(std::string(name) + " is not finite");

@@ -47,6 +47,10 @@ struct relit_player {
 
 namespace relit::player::api {
 
+[[nodiscard]] inline Unexpected invalid(std::string message) {
+  return fail(ErrorCode::kInvalid, std::move(message));
+}
+
 /// The smallest size that a struct ever had.
 template <class T>
 inline constexpr std::size_t kFirstSize = sizeof(T);

@@ -45,27 +45,13 @@ Result<std::unique_ptr<Character>> Character::create(const container::FileConten
 }
 
 Status Character::set_materials() {
-  std::vector<decoders::DecodedImage> images;
-  std::vector<gles::ImageView> views;
-  std::vector<int> view_of_image;
-  for (const container::ImageRecord& record : contents_.images) {
-    auto image = decoders::decode_image(record.bytes, record.media_type);
-    view_of_image.push_back(image ? static_cast<int>(images.size()) : -1);
-    if (image) {
-      images.push_back(std::move(*image));
-    } else {
-      warnings_.push_back("image " + std::to_string(record.id) + ": " + image.error().message);
-    }
-  }
-  for (const decoders::DecodedImage& image : images)
-    views.push_back({image.width, image.height, image.rgba});
   std::vector<gles::MaterialView> materials;
   for (const container::MaterialRecord& record : contents_.materials) {
     gles::MaterialView material;
     material.base_color = record.base_color;
     for (std::size_t i = 0; i < contents_.images.size(); ++i) {
       if (static_cast<std::int64_t>(contents_.images[i].id) == record.image_id)
-        material.image = view_of_image[i];
+        material.image = static_cast<int>(i);
     }
     material.wrap_u = to_gl(record.wrap_u), material.wrap_v = to_gl(record.wrap_v);
     material.linear_filter = record.linear_filter;
@@ -73,7 +59,19 @@ Status Character::set_materials() {
     material.alpha_cutoff = record.alpha_cutoff;
     materials.push_back(material);
   }
-  return renderer_->set_materials(views, materials);
+  decoders::DecodedImage image;
+  const auto load = [&](std::size_t index) -> std::optional<gles::ImageView> {
+    const container::ImageRecord& record = contents_.images[index];
+    image = {};  // the one before goes first
+    auto decoded = decoders::decode_image(record.bytes, record.media_type);
+    if (!decoded) {
+      warnings_.push_back("image " + std::to_string(record.id) + ": " + decoded.error().message);
+      return std::nullopt;
+    }
+    image = std::move(*decoded);
+    return gles::ImageView{image.width, image.height, image.rgba};
+  };
+  return renderer_->set_materials(contents_.images.size(), load, materials);
 }
 
 Status Character::set_meshes() {

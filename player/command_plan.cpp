@@ -161,6 +161,9 @@ Command add_plan(CLI::App& app) {
   command->add_option("--memory-budget", arguments->budget,
                       "bytes of heap and GPU together, such as 32MiB; as much as the machine has");
   command->add_option("--clip", arguments->wishes.clip, "by name or number");
+  command->add_option("--with", arguments->wishes.others,
+                      "another clip of a sequence, by name or number; repeatable. Two of them play "
+                      "at once in a cross-fade");
   command->add_option("--layers", arguments->wishes.layers, "only the first so many layers");
   command->add_option("--threads", arguments->wishes.threads, "decode workers")
       ->check(CLI::Range(1, 64));

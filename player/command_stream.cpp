@@ -7,10 +7,11 @@
 #include <optional>
 #include <thread>
 
-#include "decoders/composite.hpp"
 #include "player/command.hpp"
 #include "player/http_source.hpp"
+#include "player/memory_plan.hpp"
 #include "player/prefetcher.hpp"
+#include "player/relighter.hpp"
 
 namespace relit::player {
 namespace {
@@ -24,9 +25,10 @@ struct Arguments {
   int layers = -1;
   int threads = 1;
   std::uint64_t ring_bytes = std::uint64_t{32} << 20;
+  std::string memory_budget;
   std::uint64_t loops = 1;
   double seconds = 0;
-  bool realtime = false, json = false;
+  bool realtime = false, fill = false, json = false;
 };
 
 double seconds_since(Clock::time_point begin) {
@@ -57,33 +59,33 @@ class BufferLevels {
   double distance_s_ = 0.05, next_s_ = 0;
 };
 
-/// Composites frames on the CPU, as a player without a GPU would.
-class Composite {
- public:
-  Status open(const Prefetcher& clip, const LightArguments& arguments) {
-    RELIT_ASSIGN(const LoadedLight light, load_light(arguments, clip.model().order));
-    RELIT_TRY(decoders::fold_light(clip.model(), clip.layers(), light.light, folded_));
-    width_ = clip.model().width;
-    height_ = clip.model().height;
-    out_.resize(std::size_t{3} * clip.model().width * clip.model().height);
-    return {};
-  }
-  Status take(const ClipFrame& frame) {
-    decoders::CompositeJob job;
-    job.planes = frame.planes.planes();
-    job.light = folded_.view;
-    job.width = width_, job.height = height_;
-    job.out = out_;
-    RELIT_TRY(job.validate());
-    job.run();
-    return {};
-  }
+/// Where the file can be read twice, how large its segments are; else zeros.
+Result<SegmentScale> measure_segments(const SourceArguments& source,
+                                      const container::ClipRecord& clip) {
+  if (source.name == "-") return SegmentScale{};
+  RELIT_ASSIGN(auto bytes, open_source(source, true));
+  container::ReaderOptions options;
+  options.sparing = true;
+  RELIT_ASSIGN(auto reader, container::Reader::open(std::move(bytes), options));
+  return largest_segment(reader, clip);
+}
 
- private:
-  decoders::FoldedWeights folded_;
-  int width_ = 0, height_ = 0;
-  std::vector<float> out_;
-};
+/// What fits into --memory-budget; nothing where none was given.
+Result<std::optional<MemoryPlan>> plan_within(const Arguments& arguments,
+                                              const ClipDemuxer& demuxer) {
+  if (arguments.memory_budget.empty()) return std::optional<MemoryPlan>();
+  auto budget = parse_bytes(arguments.memory_budget);
+  if (!budget) return fail(budget.error().code, "--memory-budget " + budget.error().message);
+  RELIT_ASSIGN(const SegmentScale segments, measure_segments(arguments.source, demuxer.clip()));
+  MemoryWishes wishes;
+  wishes.clip = arguments.clip;
+  wishes.layers = arguments.layers;
+  wishes.threads = arguments.threads;
+  wishes.composite = arguments.sink == "composite";
+  auto plan = plan_memory(demuxer.contents(), segments, wishes, *budget);
+  if (!plan) return demuxer.in_file(plan.error());
+  return std::optional(std::move(*plan));
+}
 
 class Stream {
  public:
@@ -97,6 +99,7 @@ class Stream {
  private:
   explicit Stream(const Arguments& arguments) : arguments_(arguments) {}
   Status show(std::uint64_t index);
+  Status fill_ring(std::uint64_t index);
   Status show_in_time(std::uint64_t index, Clock::time_point due);
   void observe();
   [[nodiscard]] Clock::duration ticks(std::uint64_t count) const;
@@ -106,8 +109,9 @@ class Stream {
 
   Arguments arguments_;
   Clock::time_point began_ = Clock::now();
+  std::optional<MemoryPlan> plan_;
   std::unique_ptr<Prefetcher> clip_;
-  std::optional<Composite> composite_;
+  std::unique_ptr<Relighter> relighter_;  ///< composites on the CPU, as a player without a GPU
   BufferLevels levels_;
   double progress_s_ = 0;
   double open_s_ = 0, first_s_ = 0, play_s_ = 0;
@@ -129,6 +133,7 @@ Result<Stream> Stream::open(const Arguments& arguments) {
   RELIT_ASSIGN(auto demuxer,
                ClipDemuxer::open(std::move(bytes), name == "-" ? "standard input" : name,
                                  {arguments.clip, reading.sparing, interrupt}));
+  RELIT_ASSIGN(stream.plan_, plan_within(arguments, demuxer));
   PrefetchOptions options;
   options.ring_bytes = static_cast<std::size_t>(arguments.ring_bytes);
   options.decoder = arguments.decoder;
@@ -137,11 +142,26 @@ Result<Stream> Stream::open(const Arguments& arguments) {
   for (std::size_t i = 0; i < options.layers.size() && arguments.layers >= 0; ++i) {
     if (i >= static_cast<std::size_t>(arguments.layers)) options.layers[i] = 0;
   }
-  RELIT_ASSIGN(auto pool, WorkerPool::create(arguments.threads));
-  RELIT_ASSIGN(stream.clip_, Prefetcher::create(std::move(demuxer), std::move(pool), options));
+  int threads = arguments.threads;
+  if (stream.plan_) {
+    options.ring_bytes = static_cast<std::size_t>(stream.plan_->ring_bytes);
+    options.packet_bytes = static_cast<std::size_t>(stream.plan_->packet_bytes);
+    options.threads = stream.plan_->decoder_threads;
+    options.layers = stream.plan_->layers;
+    options.impatient = false;
+    threads = stream.plan_->threads;
+  }
+  std::optional<decoders::Light> light;
   if (arguments.sink == "composite") {
-    stream.composite_.emplace();
-    RELIT_TRY(stream.composite_->open(*stream.clip_, arguments.light));
+    RELIT_ASSIGN(LoadedLight loaded, load_light(arguments.light, demuxer.model().order));
+    light = std::move(loaded.light);
+  }
+  RELIT_ASSIGN(auto pool, WorkerPool::create(threads));
+  RELIT_ASSIGN(stream.clip_, Prefetcher::create(std::move(demuxer), std::move(pool), options));
+  if (light) {
+    RELIT_ASSIGN(stream.relighter_,
+                 Relighter::create(stream.clip_->model(), stream.clip_->layers(), {}));
+    RELIT_TRY(stream.relighter_->set_light(*light, options.layers));
   }
   stream.open_s_ = seconds_since(stream.began_);
   return stream;
@@ -163,10 +183,25 @@ Status Stream::show(std::uint64_t index) {
   }
   const ClipFrame* frame = clip_->frame(index);
   if (frame == nullptr) return {};
-  if (composite_) RELIT_TRY(composite_->take(*frame));
+  if (arguments_.fill) RELIT_TRY(fill_ring(index));
+  if (relighter_) RELIT_TRY(relighter_->composite({&frame->planes, nullptr, 0}));
   if (first_s_ == 0) first_s_ = seconds_since(began_);
   ++frames_;
   return {};
+}
+
+/// Waits until the ring, the present frame included, is as full as the plan says. Once it has been,
+/// it lacks one frame, the last, at most.
+Status Stream::fill_ring(std::uint64_t index) {
+  constexpr double kPatience_s = 60;
+  const std::uint64_t last = std::min(index + plan_->ring_frames, clip_->clip().frame_count) - 1;
+  const std::uint64_t behind = index == 0 ? 0 : 1;
+  if (last < index + behind + 1) return {};
+  RELIT_ASSIGN(const bool full, clip_->wait(last - behind, kPatience_s));
+  if (full) return {};
+  return fail(ErrorCode::kEnvironment, "--fill: the ring of " + std::to_string(plan_->ring_frames) +
+                                           " frames does not fill; it holds " +
+                                           std::to_string(clip_->stats().ring_frames));
 }
 
 Status Stream::show_in_time(std::uint64_t index, Clock::time_point due) {
@@ -227,6 +262,14 @@ void Stream::print_summary() const {
               static_cast<double>(stats.picture_bytes_peak) / (1 << 20),
               static_cast<double>(stats.ring_bytes_peak) / (1 << 20),
               static_cast<double>(stats.packet_bytes_peak) / (1 << 20));
+  if (!plan_) return;
+  std::printf("memory plan: %.2f MiB of heap, %llu frames ahead, %d %s, %d of %zu layers\n",
+              static_cast<double>(plan_->heap_bytes()) / (1 << 20),
+              static_cast<unsigned long long>(plan_->ring_frames), plan_->threads,
+              plan_->threads == 1 ? "thread" : "threads", plan_->layer_count(),
+              plan_->layers.size());
+  for (const std::string& sentence : plan_->given_up)
+    std::printf("given up: %s\n", sentence.c_str());
 }
 
 void Stream::print_json() const {
@@ -250,13 +293,22 @@ void Stream::print_json() const {
                  {"records", lost.records},
                  {"segments", lost.segments},
                  {"first", lost.first}};
+  if (plan_) {
+    out["plan"] = {{"budget_bytes", plan_->budget_bytes}, {"heap_bytes", plan_->heap_bytes()},
+                   {"ring_frames", plan_->ring_frames},   {"threads", plan_->threads},
+                   {"layers", plan_->layer_count()},      {"layers_of", plan_->layers.size()},
+                   {"given_up", plan_->given_up}};
+  }
   out["peak_bytes"] = {{"packets", stats.packet_bytes_peak},
                        {"pictures", stats.picture_bytes_peak},
                        {"ring", stats.ring_bytes_peak}};
   out["tracks"] = nlohmann::json::array();
   for (const PrefetchStats::Track& track : stats.tracks) {
     const char* kind = track.layer < 0 ? "pose" : track.exponents ? "exponents" : "mantissas";
-    nlohmann::json entry{{"track", track.track_id}, {"kind", kind}, {"bytes", track.bytes}};
+    nlohmann::json entry{{"track", track.track_id},
+                         {"kind", kind},
+                         {"bytes", track.bytes},
+                         {"decoders", track.decoders}};
     if (track.layer >= 0) entry["layer"] = track.layer;
     out["tracks"].push_back(std::move(entry));
   }
@@ -299,9 +351,22 @@ Command add_stream(CLI::App& app) {
   command->add_option("--threads", a->threads, "that decode")
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
-  command->add_option("--ring", a->ring_bytes, "bytes of frames decoded ahead, such as 8MiB")
-      ->transform(CLI::AsSizeValue(false))
-      ->capture_default_str();
+  CLI::Option* ring =
+      command->add_option("--ring", a->ring_bytes, "bytes of frames decoded ahead, such as 8MiB")
+          ->transform(CLI::AsSizeValue(false))
+          ->capture_default_str();
+  CLI::Option* budget =
+      command
+          ->add_option(
+              "--memory-budget", a->memory_budget,
+              "bytes of the whole process's heap, such as 32MiB: what does not fit is given "
+              "up as `relit plan --headless` says")
+          ->excludes(ring);
+  command
+      ->add_flag("--fill", a->fill,
+                 "shows no frame before the budget's ring is full again, as it is when decoding is "
+                 "faster than playback: for measuring memory")
+      ->needs(budget);
   command->add_option("--decoder", a->decoder,
                       "try this decoder of libavcodec first, such as h264_v4l2m2m");
   command->add_option("--loops", a->loops, "how often; 0: until --seconds are over")
@@ -320,6 +385,7 @@ Command add_stream(CLI::App& app) {
   command->footer(
       "Examples:\n"
       "  relit stream man.relit --threads 2\n"
+      "  relit stream man.relit --memory-budget 32MiB --sink composite --light sky.json\n"
       "  relit stream http://host/man.relit --realtime --loops 0 --seconds 60 --json");
   return [a] {
     if (a->loops == 0 && !(a->seconds > 0)) {

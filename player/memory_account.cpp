@@ -261,18 +261,16 @@ void MemoryAccount::measure_poses() {
 
 void MemoryAccount::measure_images() {
   std::vector<std::uint64_t> texels;
-  std::uint64_t working = 0;
   for (const container::ImageRecord& image : contents_->images) {
     const auto size = decoders::image_size(image.bytes);
     // What does not decode is drawn without, and costs nothing.
     texels.push_back(size ? static_cast<std::uint64_t>(size->width) *
                                 static_cast<std::uint64_t>(size->height)
                           : 0);
-    images_decoded_bytes_ += 4 * texels.back();
-    // libavcodec's picture, and its copy of the packet.
-    working = std::max<std::uint64_t>(working, 4 * texels.back() + image.bytes.size());
+    // One at a time: its texels, libavcodec's picture, and that one's copy of the packet.
+    images_working_bytes_ =
+        std::max<std::uint64_t>(images_working_bytes_, 8 * texels.back() + image.bytes.size());
   }
-  images_working_bytes_ = working;
   // One texture for each way in which an image is sampled (gles::MaterialTextures).
   const auto& materials = contents_->materials;
   for (std::size_t i = 0; i < materials.size(); ++i) {
@@ -309,14 +307,52 @@ std::uint64_t MemoryAccount::frame_bytes(std::size_t layers) const {
   return sum;
 }
 
-std::vector<MemoryTerm> MemoryAccount::terms(const MemoryChoice& choice) const {
+std::vector<MemoryTerm> MemoryAccount::own_terms(const MemoryChoice& choice) const {
   std::vector<MemoryTerm> terms;
-  add_file(terms);
   add_decoding(terms, choice);
   if (wishes_.composite) add_composite(terms, choice);
+  return terms;
+}
+
+std::uint64_t MemoryAccount::own_bytes(const MemoryChoice& choice) const {
+  std::uint64_t sum = 0;
+  for (const MemoryTerm& term : own_terms(choice)) sum += term.heap_bytes + term.gpu_bytes;
+  return sum;
+}
+
+std::vector<MemoryTerm> MemoryAccount::terms(const MemoryChoice& choice,
+                                             const MemoryAccount* other) const {
+  std::vector<MemoryTerm> terms;
+  add_file(terms);
+  const auto own = own_terms(choice);
+  terms.insert(terms.end(), own.begin(), own.end());
+  if (other != nullptr) add_other(terms, choice, *other);
   if (drawn()) add_drawing(terms);
   std::erase_if(terms, [](const MemoryTerm& t) { return t.heap_bytes == 0 && t.gpu_bytes == 0; });
   return terms;
+}
+
+// The map that two are joined in has the format and the size of the clip's that comes, which may be
+// either.
+void MemoryAccount::add_other(std::vector<MemoryTerm>& terms, const MemoryChoice& choice,
+                              const MemoryAccount& other) const {
+  MemoryTerm sum{"second clip",
+                 "\"" + other.clip_->name +
+                     "\" beside it, in a cross-fade or as the next: decoders, frames, light map"};
+  for (const MemoryTerm& term : other.own_terms(choice)) {
+    sum.heap_bytes += term.heap_bytes;
+    sum.gpu_bytes += term.gpu_bytes;
+  }
+  terms.push_back(sum);
+  if (!wishes_.composite) return;
+  const auto texels = [](const container::ModelRecord& model) {
+    return std::uint64_t{model.width} * model.height;
+  };
+  const std::uint64_t full = std::max(texels(*model_), texels(*other.model_));
+  const bool on_gpu = drawn() && choice.path != CompositePath::kCpu;
+  terms.push_back({"cross-fade", "the light map that two clips are joined in",
+                   full * 3 * sizeof(float),
+                   on_gpu ? full * light_map_texel_bytes(choice.light_map) : 0});
 }
 
 void MemoryAccount::add_file(std::vector<MemoryTerm>& terms) const {
@@ -341,7 +377,7 @@ std::uint64_t MemoryAccount::segments_held(std::uint64_t ring_frames) const {
 void MemoryAccount::add_decoding(std::vector<MemoryTerm>& terms, const MemoryChoice& choice) const {
   std::uint64_t contexts = 0, references = 0, streams = 0;
   const int threads = threads_of_decoder(choice.threads, choice.layers);
-  for (std::size_t l = 0; l < choice.layers; ++l) {
+  for (std::size_t l = 0; l < std::min(choice.layers, layers_.size()); ++l) {
     for (const Track& track : layers_[l].tracks) {
       const decoders::DecoderMemory memory =
           decoders::decoder_memory(track.format, track.pictures, track.mantissas ? threads : 1);
@@ -352,6 +388,7 @@ void MemoryAccount::add_decoding(std::vector<MemoryTerm>& terms, const MemoryCho
     }
   }
   const std::uint64_t segments = segments_held(choice.ring_frames);
+  const std::uint64_t frame = std::max(frame_bytes(choice.layers), choice.frame_bytes);
   terms.push_back({"decoders",
                    count_of(streams, "decoder", "decoders") + " on " +
                        count_of(static_cast<std::uint64_t>(choice.threads), "thread", "threads"),
@@ -361,10 +398,10 @@ void MemoryAccount::add_decoding(std::vector<MemoryTerm>& terms, const MemoryCho
                    references});
   terms.push_back({"ring",
                    count_of(choice.ring_frames, "frame", "frames") + " decoded ahead of " +
-                       std::to_string(frame_bytes(choice.layers)) + " bytes",
-                   choice.ring_frames * frame_bytes(choice.layers)});
+                       std::to_string(frame) + " bytes",
+                   choice.ring_frames * frame});
   terms.push_back({"packets", "coded packets of " + count_of(segments, "segment", "segments"),
-                   segments * segments_.bytes});
+                   segments * std::max(segments_.bytes, choice.segment_bytes)});
   terms.push_back({"poses", "the pose track and its decoded segments",
                    pose_fixed_bytes_ + segments * pose_segment_bytes_});
 }
@@ -414,11 +451,12 @@ void MemoryAccount::add_drawing(std::vector<MemoryTerm>& terms) const {
   const auto side = static_cast<std::uint64_t>(drawing.background_side);
   terms.push_back({"drawn meshes", "vertices and triangles in the GPU's buffers",
                    most * sizeof(glm::vec3), meshes});
-  terms.push_back({"images", "the materials' images: decoded while they are uploaded, and textures",
-                   images_decoded_bytes_ + images_working_bytes_, images_gpu_bytes_});
-  // The cube map's floats and one face of halves while it is made.
+  terms.push_back({"images",
+                   "the materials' images: the largest while it is uploaded, and textures",
+                   images_working_bytes_, images_gpu_bytes_});
+  // One face at a time, as floats and as halves.
   terms.push_back({"background", "the environment's cube map",
-                   6 * side * side * 3 * sizeof(float) + side * side * 8, 6 * side * side * 8});
+                   side * side * (3 * sizeof(float) + 8), 6 * side * side * 8});
   terms.push_back(
       {"framebuffer", "the picture, its samples and its depth", 0, framebuffer_bytes(drawing)});
 }

@@ -21,6 +21,8 @@ struct MemoryChoice {
   CompositePath path = CompositePath::kCpu;
   gles::LightMapFormat light_map = gles::LightMapFormat::kHalfFloat;
   std::size_t layers = 1;  ///< from the most important on
+  /// No choice: of another clip that plays with the same bounds of ring and packets.
+  std::uint64_t frame_bytes = 0, segment_bytes = 0;
 };
 
 /// A clip as far as memory is concerned. Borrows the file's contents.
@@ -40,8 +42,12 @@ class MemoryAccount {
   /// The largest segment's packets.
   [[nodiscard]] std::uint64_t segment_bytes() const { return segments_.bytes; }
 
-  /// All terms but those that are zero.
-  [[nodiscard]] std::vector<MemoryTerm> terms(const MemoryChoice& choice) const;
+  /// All terms but those that are zero. With `other`, also what that clip of the file takes while
+  /// both play, and what fades between them.
+  [[nodiscard]] std::vector<MemoryTerm> terms(const MemoryChoice& choice,
+                                              const MemoryAccount* other = nullptr) const;
+  /// What the clip takes of its own, beside what it shares with other clips of the file.
+  [[nodiscard]] std::uint64_t own_bytes(const MemoryChoice& choice) const;
 
  private:
   MemoryAccount() = default;
@@ -65,7 +71,10 @@ class MemoryAccount {
   void add_file(std::vector<MemoryTerm>& terms) const;
   void add_decoding(std::vector<MemoryTerm>& terms, const MemoryChoice& choice) const;
   void add_composite(std::vector<MemoryTerm>& terms, const MemoryChoice& choice) const;
+  void add_other(std::vector<MemoryTerm>& terms, const MemoryChoice& choice,
+                 const MemoryAccount& other) const;
   void add_drawing(std::vector<MemoryTerm>& terms) const;
+  [[nodiscard]] std::vector<MemoryTerm> own_terms(const MemoryChoice& choice) const;
   [[nodiscard]] std::uint64_t segments_held(std::uint64_t ring_frames) const;
 
   const container::FileContents* contents_ = nullptr;
@@ -78,7 +87,6 @@ class MemoryAccount {
   std::uint64_t pose_frame_bytes_ = 0;    ///< sampled
   std::uint64_t pose_segment_bytes_ = 0;  ///< decoded
   std::uint64_t pose_fixed_bytes_ = 0;
-  std::uint64_t images_decoded_bytes_ = 0;
   std::uint64_t images_working_bytes_ = 0;
   std::uint64_t images_gpu_bytes_ = 0;
   gles::PlaneSheets::Bytes sheets_;  ///< of the planes of all layers

@@ -30,7 +30,66 @@ std::uint64_t default_ring(const container::ClipRecord& clip) {
   return static_cast<std::uint64_t>(std::clamp(rate / 4, 4.0, 16.0));
 }
 
-Result<MemoryChoice> wished(const MemoryAccount& account, const MemoryWishes& wishes) {
+/// The clips of a plan, the one that it is about first.
+class Accounts {
+ public:
+  static Result<Accounts> create(const container::FileContents& contents,
+                                 const SegmentScale& segments, const MemoryWishes& wishes) {
+    Accounts accounts;
+    RELIT_ASSIGN(auto first, MemoryAccount::create(contents, segments, wishes));
+    accounts.clips_.push_back(std::move(first));
+    MemoryWishes other = wishes;
+    for (const std::string& clip : wishes.others) {
+      other.clip = clip;
+      // The segments of others are not known.
+      RELIT_ASSIGN(auto account, MemoryAccount::create(contents, {}, other));
+      accounts.clips_.push_back(std::move(account));
+    }
+    return accounts;
+  }
+
+  [[nodiscard]] const MemoryAccount& first() const { return clips_.front(); }
+  /// Of the most layers that a clip has.
+  [[nodiscard]] std::size_t layer_count() const {
+    std::size_t most = 0;
+    for (const MemoryAccount& clip : clips_) most = std::max(most, clip.layer_count());
+    return most;
+  }
+  [[nodiscard]] std::uint64_t frame_bytes(std::size_t layers) const {
+    std::uint64_t most = 0;
+    for (const MemoryAccount& clip : clips_) most = std::max(most, clip.frame_bytes(layers));
+    return most;
+  }
+  [[nodiscard]] std::uint64_t segment_bytes() const {
+    std::uint64_t most = 0;
+    for (const MemoryAccount& clip : clips_) most = std::max(most, clip.segment_bytes());
+    return most;
+  }
+  /// Of the two that take most.
+  [[nodiscard]] std::vector<MemoryTerm> terms(MemoryChoice choice) const {
+    choice.frame_bytes = frame_bytes(choice.layers);
+    choice.segment_bytes = segment_bytes();
+    const MemoryAccount *most = nullptr, *second = nullptr;
+    std::uint64_t most_bytes = 0, second_bytes = 0;
+    for (const MemoryAccount& clip : clips_) {
+      const std::uint64_t bytes = clips_.size() > 1 ? clip.own_bytes(choice) : 0;
+      if (most == nullptr || bytes > most_bytes) {
+        second = std::exchange(most, &clip);
+        second_bytes = std::exchange(most_bytes, bytes);
+      } else if (second == nullptr || bytes > second_bytes) {
+        second = &clip;
+        second_bytes = bytes;
+      }
+    }
+    return most->terms(choice, second);
+  }
+
+ private:
+  std::vector<MemoryAccount> clips_;
+};
+
+Result<MemoryChoice> wished(const Accounts& accounts, const MemoryWishes& wishes) {
+  const MemoryAccount& account = accounts.first();
   if (wishes.threads < 1 || wishes.threads > 64) {
     return fail(ErrorCode::kInvalid, "threads are 1 to 64, not " + std::to_string(wishes.threads));
   }
@@ -47,7 +106,7 @@ Result<MemoryChoice> wished(const MemoryAccount& account, const MemoryWishes& wi
   choice.light_map = wishes.light_map == gles::LightMapFormat::kAuto
                          ? gles::LightMapFormat::kHalfFloat
                          : wishes.light_map;
-  choice.layers = account.layer_count();
+  choice.layers = accounts.layer_count();
   if (wishes.layers > 0) {
     choice.layers = std::min(choice.layers, static_cast<std::size_t>(wishes.layers));
   }
@@ -57,7 +116,7 @@ Result<MemoryChoice> wished(const MemoryAccount& account, const MemoryWishes& wi
 /// The ways in which each thing can be given up, best first.
 class Search {
  public:
-  Search(const MemoryAccount& account, const MemoryChoice& wish, std::uint64_t budget)
+  Search(const Accounts& account, const MemoryChoice& wish, std::uint64_t budget)
       : account_(account), wish_(wish), budget_(budget) {
     paths_ = {wish.path};
     if (wish.path == CompositePath::kAuto) {
@@ -65,7 +124,7 @@ class Search {
                     {CompositePath::kCpu, CompositePath::kTexture, CompositePath::kFused});
     }
     formats_ = {wish.light_map};
-    if (account.drawn() && wish.light_map != gles::LightMapFormat::kSquareRoot8) {
+    if (account.first().drawn() && wish.light_map != gles::LightMapFormat::kSquareRoot8) {
       formats_.push_back(gles::LightMapFormat::kSquareRoot8);
     }
   }
@@ -149,7 +208,7 @@ class Search {
     return low;
   }
 
-  const MemoryAccount& account_;
+  const Accounts& account_;
   MemoryChoice wish_;
   std::uint64_t budget_;
   std::vector<CompositePath> paths_;
@@ -201,7 +260,7 @@ int MemoryPlan::layer_count() const {
 
 Result<std::uint64_t> smallest_budget(const container::FileContents& contents,
                                       const SegmentScale& segments, const MemoryWishes& wishes) {
-  RELIT_ASSIGN(const MemoryAccount account, MemoryAccount::create(contents, segments, wishes));
+  RELIT_ASSIGN(const Accounts account, Accounts::create(contents, segments, wishes));
   RELIT_ASSIGN(const MemoryChoice wish, wished(account, wishes));
   return total(account.terms(Search(account, wish, 0).least()));
 }
@@ -209,7 +268,7 @@ Result<std::uint64_t> smallest_budget(const container::FileContents& contents,
 Result<MemoryPlan> plan_memory(const container::FileContents& contents,
                                const SegmentScale& segments, const MemoryWishes& wishes,
                                std::optional<std::uint64_t> budget_bytes) {
-  RELIT_ASSIGN(const MemoryAccount account, MemoryAccount::create(contents, segments, wishes));
+  RELIT_ASSIGN(const Accounts account, Accounts::create(contents, segments, wishes));
   RELIT_ASSIGN(const MemoryChoice wish, wished(account, wishes));
   const std::uint64_t budget = budget_bytes.value_or(kUnlimited);
   const Search search(account, wish, budget);
@@ -217,7 +276,7 @@ Result<MemoryPlan> plan_memory(const container::FileContents& contents,
     const std::uint64_t needed = total(account.terms(least));
     return fail(ErrorCode::kOutOfMemory,
                 "a memory budget of " + std::to_string(budget) +
-                    " bytes does not suffice: clip \"" + account.clip().name +
+                    " bytes does not suffice: clip \"" + account.first().clip().name +
                     "\" needs at least " + std::to_string(needed) + " (" + mebibytes(needed) + ")");
   }
   const MemoryChoice choice = search.best();

@@ -37,7 +37,11 @@ struct DrawingScale {
 
 /// What the caller would like. A plan grants as much of it as fits the budget, and never more.
 struct MemoryWishes {
-  std::string clip;               ///< by name or number; empty: the first
+  std::string clip;  ///< by name or number; empty: the first
+  /// The other clips of a sequence, as `clip`; one that comes twice is named twice. Two clips have
+  /// decoders, frames and a light map at once: those of a cross-fade, or one and the next. The plan
+  /// counts the two that take most, and grants both the same.
+  std::vector<std::string> others;
   int layers = -1;                ///< the first so many; -1: all
   int threads = 1;                ///< decode workers, 1 to 64
   std::uint64_t ring_frames = 0;  ///< decoded ahead; 0: a quarter of a second, 4 to 16. At least 2

@@ -65,8 +65,7 @@ PrefetchOptions Player::State::prefetch_options(std::size_t layer_count, bool ro
   return prefetch;
 }
 
-Status Player::State::plan_and_start(ClipDemuxer demuxer) {
-  statics = demuxer.statics();
+MemoryWishes Player::State::wishes() const {
   const int processors = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   MemoryWishes wishes;
   wishes.clip = options.clip;
@@ -76,8 +75,13 @@ Status Player::State::plan_and_start(ClipDemuxer demuxer) {
   wishes.threads = options.pool          ? options.pool->threads()
                    : options.threads > 0 ? options.threads
                                          : std::min(processors, 64);
-  RELIT_ASSIGN(plan,
-               plan_memory(statics->contents, SegmentScale{}, wishes, options.memory_budget_bytes));
+  return wishes;
+}
+
+Status Player::State::plan_and_start(ClipDemuxer demuxer) {
+  statics = demuxer.statics();
+  RELIT_ASSIGN(
+      plan, plan_memory(statics->contents, SegmentScale{}, wishes(), options.memory_budget_bytes));
   for (const std::string& sentence : plan.given_up) say(LogLevel::kInfo, sentence);
   pool = options.pool;
   if (!pool) {
@@ -155,7 +159,12 @@ Status Player::play_clip(std::size_t clip, double cross_fade_s) {
   if (!seekable() && clip < contents().clips.size() && clip != state_->primary->clip())
     return fail(ErrorCode::kUnsupported,
                 state_->options.name + ": another clip needs a source that can seek");
+  // The clip that goes plays on while it fades.
+  const std::size_t both[2] = {clip, state_->moment.clip};
+  const bool fades = seekable() && cross_fade_s > 0;
+  RELIT_ASSIGN(MemoryPlan planned, state_->plan_for(std::span(both).first(fades ? 2 : 1)));
   RELIT_TRY(state_->playback->play_clip(clip, seekable() ? cross_fade_s : 0));
+  RELIT_TRY(state_->follow(std::move(planned)));
   state_->sequence.clear();
   ++state_->program;
   state_->jumped();
@@ -166,7 +175,11 @@ Status Player::play_sequence(std::span<const SequenceItem> items, bool loop) {
   if (!seekable())
     return fail(ErrorCode::kUnsupported,
                 state_->options.name + ": a sequence needs a source that can seek");
+  std::vector<std::size_t> clips;
+  for (const SequenceItem& item : items) clips.push_back(item.clip);
+  RELIT_ASSIGN(MemoryPlan planned, state_->plan_for(clips));
   RELIT_TRY(state_->playback->play_sequence(items, loop));
+  RELIT_TRY(state_->follow(std::move(planned)));
   state_->sequence.assign(items.begin(), items.end());
   state_->sequence_loops = loop;
   ++state_->program;

@@ -149,24 +149,32 @@ Status Player::State::draw(const gles::View& view, const Backdrop& wanted) {
       RELIT_TRY(renderer.update_positions(m, posed->positions(m)));
     positions_uploaded = true;
   }
+  ++draws;
+  if (wants_measuring(view)) return measure_path(view);
   RELIT_TRY(lit->relighter()->draw(renderer, view));
   const double took_s = seconds_since(begin);
-  if (draws++ == 0) counted.first_draw_ms = 1e3 * took_s;
+  if (draws == 1) counted.first_draw_ms = 1e3 * took_s;
   draw_s.add(took_s);
   drawn_s += took_s;
-  return measure_paths(view);
+  return {};
 }
 
-// The one path that is cheapest for what is seen. Not during a fade, which comes and goes.
-Status Player::State::measure_paths(const gles::View& view) {
-  if (draws < kFirstMeasuring || secondary || lit != primary.get() ||
+// Which path is cheapest for what is seen. Not during a fade, which comes and goes.
+bool Player::State::wants_measuring(const gles::View& view) {
+  if (draws <= kFirstMeasuring || secondary || lit != primary.get() ||
       primary_frames.from == nullptr || moment.late)
-    return {};
+    return false;
+  return primary->relighter()->wants_measuring(covered_pixels(view));
+}
+
+// This picture is drawn by the path whose turn it is. The governor is not told how long that took:
+// it says nothing about the pictures to come.
+Status Player::State::measure_path(const gles::View& view) {
   Relighter& relighter = *primary->relighter();
-  if (!relighter.wants_measuring(covered_pixels(view))) return {};
-  RELIT_TRY(relighter.measure(primary_frames.mix(), character->renderer(), view));
-  say(LogLevel::kInfo, "composite: " + relighter.why());
-  return relighter.draw(character->renderer(), view);
+  RELIT_ASSIGN(const bool chosen,
+               relighter.measure(primary_frames.mix(), character->renderer(), view));
+  if (chosen) say(LogLevel::kInfo, "composite: " + relighter.why());
+  return {};
 }
 
 // The area of the projected bounding box, within the view.

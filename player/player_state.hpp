@@ -40,6 +40,7 @@ struct Player::State final : FrameTimes {
   // player.cpp
   Status open(std::unique_ptr<container::ByteSource> source);
   Status plan_and_start(ClipDemuxer demuxer);
+  [[nodiscard]] MemoryWishes wishes() const;
   [[nodiscard]] PrefetchOptions prefetch_options(std::size_t layer_count, bool round) const;
   [[nodiscard]] std::vector<std::uint8_t> allowed_layers(std::size_t count) const;
   [[nodiscard]] std::optional<FrameSpan> at_tick(std::size_t clip,
@@ -55,11 +56,14 @@ struct Player::State final : FrameTimes {
   Status assign_voices(const Moment& now);
   Status change_item(const Moment& now);
   void drop(std::unique_ptr<ClipVoice>& voice);
+  [[nodiscard]] std::string name_of(std::size_t clip) const;
   [[nodiscard]] bool goes_round(std::size_t item) const;
   Result<std::unique_ptr<ClipVoice>> make_voice(std::size_t clip, bool round);
   Status attach_voice(ClipVoice& voice);
   Status prepare_next(const Moment& now);
   Status set_loops();
+  [[nodiscard]] Result<MemoryPlan> plan_for(std::span<const std::size_t> clips) const;
+  Status follow(MemoryPlan planned);
   [[nodiscard]] std::array<ClipVoice*, 4> voices() const {
     return {primary.get(), secondary.get(), prepared.get(), leaving.get()};
   }
@@ -85,7 +89,8 @@ struct Player::State final : FrameTimes {
   void use_exposure(float exposure);
   Status freshen();
   Status draw(const gles::View& view, const Backdrop& wanted);
-  Status measure_paths(const gles::View& view);
+  [[nodiscard]] bool wants_measuring(const gles::View& view);
+  Status measure_path(const gles::View& view);
   [[nodiscard]] double covered_pixels(const gles::View& view) const;
   [[nodiscard]] PlayerStats stats() const;
 

@@ -34,6 +34,8 @@ Status Player::State::update(std::int64_t now_ns) {
   if (last_ns && now_ns > *last_ns && !stand && !playback->paused())
     light_time_s += 1e-9 * static_cast<double>(now_ns - *last_ns) * playback->speed();
   last_ns = now_ns;
+  // The picture that was waited for has been drawn.
+  if (moment.ready && !seeking) primary->prefetcher().fetch_ahead();
   if (stand) playback->skip_to(now_ns);
   Moment now = stand ? playback->now() : playback->at(now_ns);
   // After a seek into frames of unequal length somebody has to look where they are.

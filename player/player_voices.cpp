@@ -1,16 +1,21 @@
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <utility>
 
 #include "player/player_state.hpp"
 
 namespace relit::player {
 
+// By which find_clip() finds it.
+std::string Player::State::name_of(std::size_t clip) const {
+  const std::string& name = statics->contents.clips[clip].name;
+  return name.empty() ? std::to_string(clip) : name;
+}
+
 // Only the first voice may interrupt the source, which they share: it would stop the others' reads
 // as well.
 Result<std::unique_ptr<ClipVoice>> Player::State::make_voice(std::size_t clip, bool round) {
-  const std::string& name = statics->contents.clips[clip].name;
-  DemuxOptions demux{name.empty() ? std::to_string(clip) : name, options.sparing || layers >= 0,
-                     nullptr};
+  DemuxOptions demux{name_of(clip), options.sparing || layers >= 0, nullptr};
   RELIT_ASSIGN(ClipDemuxer demuxer, root->another(shared->cursor(), demux));
   const PrefetchOptions prefetch = prefetch_options(demuxer.layers().size(), round);
   RELIT_ASSIGN(auto voice, ClipVoice::create(clip, std::move(demuxer), pool, prefetch));
@@ -87,10 +92,51 @@ Status Player::State::change_item(const Moment& now) {
   return set_loops();
 }
 
+// What playing these clips takes, one after another, within the budget. Where there is none, or a
+// clip is not there, which Playback says, it is as it was.
+Result<MemoryPlan> Player::State::plan_for(std::span<const std::size_t> clips) const {
+  const std::size_t count = statics->contents.clips.size();
+  const bool known = std::ranges::all_of(clips, [&](std::size_t clip) { return clip < count; });
+  if (!options.memory_budget_bytes || clips.empty() || !known) return plan;
+  MemoryWishes wanted = wishes();
+  wanted.clip = name_of(clips.front());
+  for (const std::size_t clip : clips.subspan(1)) wanted.others.push_back(name_of(clip));
+  return plan_memory(statics->contents, SegmentScale{}, wanted, options.memory_budget_bytes);
+}
+
+// Brings what plays within another plan. Decoders keep their threads: where those are others,
+// voices are made anew, and what is shown stays until its place is taken.
+Status Player::State::follow(MemoryPlan planned) {
+  if (!options.memory_budget_bytes) return {};
+  const MemoryPlan before = std::exchange(plan, std::move(planned));
+  for (const std::string& sentence : plan.given_up) say(LogLevel::kInfo, sentence);
+  const bool redraw = plan.path != before.path || plan.light_map != before.light_map;
+  const std::lock_guard lock(roles);
+  if (plan.decoder_threads != before.decoder_threads && shared) {
+    drop(secondary);
+    drop(prepared);
+    RELIT_ASSIGN(auto anew, make_voice(primary->clip(), false));
+    drop(primary);
+    primary = std::move(anew);
+    primary_item.reset();
+    primary_frames = {};
+  }
+  for (ClipVoice* voice : voices()) {
+    if (voice == nullptr) continue;
+    voice->prefetcher().set_limits(static_cast<std::size_t>(plan.ring_bytes),
+                                   static_cast<std::size_t>(plan.packet_bytes));
+    voice->allow(allowed_layers(voice->prefetcher().layers().size()));
+    if (redraw) RELIT_TRY(attach_voice(*voice));
+  }
+  if (redraw) lit = nullptr;
+  light_stale = true;
+  return {};
+}
+
 // Of a sequence, the item after the one that plays has its first frames decoded when its turn
 // comes.
 Status Player::State::prepare_next(const Moment& now) {
-  if (sequence.size() < 2 || secondary || prepared) return {};
+  if (sequence.size() < 2 || secondary || prepared || leaving) return {};
   std::size_t next = now.item + 1;
   if (next >= sequence.size()) {
     if (!playback->loops()) return {};

@@ -26,9 +26,11 @@ bool State::may_read() const {
   if (start_tick) return true;
   const bool lap_over = ended || come_end >= lap_end();
   if (lap_over && (!loop || !demuxer.seekable())) return false;
+  if (starving || (segments.empty() && next_index.has_value())) return true;
+  // See go_on().
+  if (!eager && come_end > start + 1) return false;
   constexpr std::size_t kMostSegments = 64;
-  if (packet_bytes < packet_limit && segments.size() < kMostSegments) return true;
-  return starving || (segments.empty() && next_index.has_value());
+  return packet_bytes < packet_limit && segments.size() < kMostSegments;
 }
 
 void State::run() {
@@ -67,7 +69,9 @@ void State::go_to_start(std::unique_lock<std::mutex>& lock) {
   const std::optional<std::uint64_t> tick = start_tick;
   const bool at_beginning = demux_epoch == 0 && demuxer.complete_end() == 0 && !tick;
   if (demuxer.interrupt() && !closing && !cancelled) demuxer.interrupt()->clear();
-  for (const auto& track : tracks) drop_chunks(*track, last_no + 1);
+  for (const auto& track : tracks) {
+    for (const auto& lane : track->lanes) drop_chunks(*lane, last_no + 1);
+  }
   lock.unlock();
   Result<bool> jumped = tick                         ? demuxer.jump_to_tick(*tick)
                         : at_beginning && index == 0 ? Result<bool>(false)
@@ -193,7 +197,7 @@ void State::take_chunk(container::ChunkRecord& chunk) {
   Track& track = **found;
   track.about.bytes += chunk.data.size();
   packet_bytes += container::storage_bytes(chunk);
-  track.inbox.push_back(
+  track.lanes[last_no % track.lanes.size()]->inbox.push_back(
       {last_no, segment->index, segment->first_frame, segment->frame_count, std::move(chunk)});
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The ring of a Prefetcher: which frames are decoded next, and which may go.
 #include <algorithm>
+#include <utility>
 
 #include "player/prefetch_state.hpp"
 
@@ -9,7 +10,9 @@ namespace relit::player {
 using State = Prefetcher::State;
 
 void State::wake() {
-  for (const auto& track : tracks) track->strand->wake();
+  for (const auto& track : tracks) {
+    for (const auto& lane : track->lanes) lane->strand->wake();
+  }
   work.notify_one();
 }
 
@@ -40,6 +43,14 @@ void State::admit() {
   }
 }
 
+// The first picture after the beginning or a jump has the machine to itself, and so has the host
+// that draws it: nothing else is fetched or decoded until playback moves on or the host says so.
+void State::go_on() {
+  if (std::exchange(eager, true)) return;
+  admit();
+  wake();
+}
+
 bool State::admit_one() {
   const std::uint64_t index = *next_index;
   std::erase_if(segments, [&](const Segment& s) {
@@ -58,9 +69,8 @@ bool State::admit_one() {
     if ((*found->wanted)[t] != 0) expected += tracks[t]->picture_bytes;
   }
   constexpr std::uint64_t kLeastFrames = 2;
-  if (ring_bytes + pending_bytes + expected > ring_limit && tail - head >= kLeastFrames) {
-    return false;
-  }
+  const bool full = ring_bytes + pending_bytes + expected > ring_limit;
+  if ((full || !eager) && tail - head >= kLeastFrames) return false;
   if (free_slots.empty()) {
     slots.push_back(std::make_unique<Slot>());
     free_slots.reserve(slots.size());
@@ -153,7 +163,7 @@ void State::restart(std::uint64_t index, std::optional<std::uint64_t> tick) {
   error.reset();
   segments.clear();
   next_index = std::nullopt;
-  given = false;
+  given = eager = false;
   if (demuxer.interrupt() && demuxer.seekable()) demuxer.interrupt()->raise();
   wake();
 }

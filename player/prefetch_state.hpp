@@ -61,22 +61,17 @@ struct Prefetcher::State {
     std::uint32_t frame_count = 0;
     container::ChunkRecord record;
   };
-  /// A decoder and what waits for it.
-  struct Track {
-    PrefetchStats::Track about;
-    decoders::VideoFormat format;
-    bool pose = false;
-    bool enabled = false;  ///< the layer is wanted from the next segment on
+  /// A decoder of a track and what waits for it. A track may have several, which take its segments
+  /// in turn: each segment begins with a decoder that knows nothing of the one before.
+  struct Lane {
+    std::size_t track = 0;  ///< whose
+    std::size_t turn = 0;   ///< takes the segments whose number leaves this over
     std::vector<Chunk> inbox;
-    std::size_t picture_bytes = 0;
     std::optional<decoders::TrackDecoder> incoming;  ///< for the strand to take over
-    bool noted = false;                              ///< the decoder's note has been passed on
     std::size_t held_bytes = 0;                      ///< storage of the chunk in the decoder
 
     // The strand's alone.
     std::optional<decoders::TrackDecoder> decoder;
-    std::optional<decoders::PoseTrack> poses;
-    decoders::Pose scratch;
     Chunk chunk;
     std::uint64_t epoch = 0;
     std::uint64_t cursor = 0;      ///< seq of the next frame
@@ -87,6 +82,20 @@ struct Prefetcher::State {
 
     std::unique_ptr<WorkerPool::Strand> strand;
   };
+  struct Track {
+    PrefetchStats::Track about;
+    decoders::VideoFormat format;
+    decoders::VideoDecoderOptions decoding;  ///< what its decoders are opened with
+    bool pose = false;
+    bool enabled = false;  ///< the layer is wanted from the next segment on
+    std::size_t picture_bytes = 0;
+    bool noted = false;  ///< the decoder's note has been passed on
+    std::vector<std::unique_ptr<Lane>> lanes;
+
+    // Of the poses, which have one lane; its strand's alone.
+    std::optional<decoders::PoseTrack> poses;
+    decoders::Pose scratch;
+  };
 
   explicit State(ClipDemuxer d) : demuxer(std::move(d)), timeline(demuxer.timeline()) {}
   ~State();
@@ -96,6 +105,7 @@ struct Prefetcher::State {
   [[nodiscard]] Slot* find(std::uint64_t index);
   [[nodiscard]] std::optional<std::uint64_t> following(std::uint64_t index) const;
   void admit();
+  void go_on();
   bool admit_one();
   void lay_out(Slot& slot, const Segment* segment);
   void detach(std::uint64_t seq);
@@ -111,17 +121,18 @@ struct Prefetcher::State {
 
   // prefetch_tracks.cpp
   Status open_tracks(const PrefetchOptions& options, std::shared_ptr<WorkerPool> workers);
-  Status open_decoder(Track& track, std::size_t wanted_layers);
-  bool run_strand(std::size_t number);
-  bool step(std::size_t number);
-  bool begin_step(Track& track, std::unique_lock<std::mutex>& lock);
-  bool find_work(Track& track, std::size_t number);
-  bool find_chunk(Track& track, const Slot& slot);
-  void drop_chunks(Track& track, std::uint64_t before_no);
-  Status load_chunk(Track& track);
+  void share_out_threads(const PrefetchOptions& options);
+  Result<decoders::TrackDecoder> open_decoder(const Track& track) const;
+  bool run_strand(Lane& lane);
+  bool step(Lane& lane);
+  bool begin_step(Lane& lane, std::unique_lock<std::mutex>& lock);
+  bool find_work(Lane& lane);
+  bool find_chunk(Lane& lane, const Slot& slot);
+  void drop_chunks(Lane& lane, std::uint64_t before_no);
+  Status load_chunk(Lane& lane);
   Status decode_pose(Track& track, std::uint64_t index);
-  Status decode_picture(Track& track, std::uint64_t index, decoders::VideoFrame& picture);
-  void finish_part(Track& track, std::size_t number, std::uint64_t seq, const Status& decoded,
+  Status decode_picture(Lane& lane, std::uint64_t index, decoders::VideoFrame& picture);
+  void finish_part(Lane& lane, std::uint64_t seq, const Status& decoded,
                    decoders::VideoFrame& picture);
   void note_damage(const Error& error);
 
@@ -144,8 +155,6 @@ struct Prefetcher::State {
   std::shared_ptr<WorkerPool> pool;
   std::shared_ptr<decoders::PictureMemory> memory;
   std::size_t ring_limit = 0, packet_limit = 0;
-  int threads = 1;
-  std::string decoder_name;
   bool planes = true, impatient = true;
 
   mutable std::mutex mutex;
@@ -177,6 +186,7 @@ struct Prefetcher::State {
   Slot* fallback = nullptr;     ///< newest good frame that has gone by
   std::uint64_t wanted_index = 0;
   bool given = false;                       ///< a picture since the start or jump
+  bool eager = false;                       ///< playback has moved on from the first picture
   bool underrun = false;                    ///< counted for the wanted frame
   std::optional<std::uint64_t> next_index;  ///< to be admitted; none: the end
   std::uint64_t admit_lap = 0;

@@ -17,7 +17,7 @@ Prefetcher::State::~State() {
   work.notify_all();
   if (thread.joinable()) thread.join();
   for (const auto& track : tracks) {
-    if (track->strand) track->strand->close();
+    for (const auto& lane : track->lanes) lane->strand->close();
   }
 }
 
@@ -33,8 +33,6 @@ Result<std::unique_ptr<Prefetcher>> Prefetcher::create(ClipDemuxer demuxer,
     State& s = *state;
     s.ring_limit = options.ring_bytes;
     s.packet_limit = options.packet_bytes;
-    s.threads = options.threads;
-    s.decoder_name = options.decoder;
     s.planes = options.planes;
     s.impatient = options.impatient;
     s.start = s.wanted_index = options.first_frame;
@@ -83,6 +81,7 @@ void Prefetcher::want(std::uint64_t index) {
   for (std::uint64_t seq = s.head; seq < s.tail; ++seq) {
     if (!s.at(seq).shows(index)) continue;
     s.release_before(seq);
+    s.eager = true;
     s.admit();
     s.wake();
     return;
@@ -91,6 +90,7 @@ void Prefetcher::want(std::uint64_t index) {
     if (s.error) return;
     s.release_before(s.tail);
     s.next_index = index;
+    s.eager = true;
     s.admit();
     s.wake();
     return;
@@ -104,12 +104,18 @@ void Prefetcher::want(std::uint64_t index) {
   }
 }
 
+void Prefetcher::fetch_ahead() {
+  const std::lock_guard lock(state_->mutex);
+  state_->go_on();
+}
+
 const ClipFrame* Prefetcher::frame(std::uint64_t index) {
   State& s = *state_;
   const std::lock_guard lock(s.mutex);
   State::Slot* slot = s.find(index);
   const bool wanted = index == s.wanted_index;
   if (slot == nullptr || !s.ready(*slot)) {
+    if (!wanted) s.go_on();
     if (wanted && s.given && !std::exchange(s.underrun, true)) ++s.counts.underruns;
     return nullptr;
   }
@@ -142,6 +148,7 @@ Result<bool> Prefetcher::wait(std::uint64_t index, double timeout_s) {
   State& s = *state_;
   RELIT_TRY(s.demuxer.check_frame(index));
   std::unique_lock lock(s.mutex);
+  if (index != s.wanted_index) s.go_on();
   const auto here = [&] {
     const State::Slot* slot = s.find(index);
     return slot != nullptr && s.ready(*slot);
@@ -223,14 +230,14 @@ Status Prefetcher::set_layers(std::span<const std::uint8_t> wanted, bool now) {
   }
   return catch_out_of_memory("choosing layers", [&]() -> Status {
     const std::lock_guard lock(s.mutex);
-    const auto chosen =
-        static_cast<std::size_t>(std::ranges::count_if(wanted, [](auto w) { return w != 0; }));
     auto by_track = std::make_shared<std::vector<std::uint8_t>>(s.tracks.size(), 1);
     for (std::size_t t = 1; t < s.tracks.size(); ++t) {
       State::Track& track = *s.tracks[t];
       const bool enable = wanted[static_cast<std::size_t>(track.about.layer)] != 0;
       (*by_track)[t] = enable ? 1 : 0;
-      if (enable && !track.enabled) RELIT_TRY(s.open_decoder(track, chosen));
+      if (!enable || track.enabled) continue;
+      // Those of the other lanes are opened when their first segment has come.
+      RELIT_ASSIGN(track.lanes.front()->incoming, s.open_decoder(track));
     }
     for (std::size_t t = 0; t < s.tracks.size(); ++t) s.tracks[t]->enabled = (*by_track)[t] != 0;
     s.wanted = std::move(by_track);
@@ -270,6 +277,15 @@ Status Prefetcher::set_loop(bool loop, std::uint64_t begin, std::uint64_t end) {
 void Prefetcher::set_every(std::uint64_t n) {
   const std::lock_guard lock(state_->mutex);
   state_->every = n;
+}
+
+void Prefetcher::set_limits(std::size_t ring_bytes, std::size_t packet_bytes) {
+  State& s = *state_;
+  const std::lock_guard lock(s.mutex);
+  s.ring_limit = ring_bytes;
+  s.packet_limit = packet_bytes;
+  s.admit();
+  s.wake();
 }
 
 PrefetchStats Prefetcher::stats() const {

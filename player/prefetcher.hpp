@@ -24,8 +24,10 @@ struct PrefetchOptions {
   /// Coded chunks that wait for their decoder. Where a decoder has nothing to do without the next
   /// segment, that one is read all the same.
   std::size_t packet_bytes = std::size_t{8} << 20;
-  /// Frame threads of each mantissa decoder, see decoders::VideoDecoderOptions; 0: the pool's
-  /// threads shared out among the layers that are wanted.
+  /// Frame threads of each mantissa decoder, see decoders::VideoDecoderOptions; each track has one
+  /// decoder then. 0: as many decoders for each track as the pool has threads and the ring reaches
+  /// over segments (of half a second), which take segments in turn; what threads are left are
+  /// shared out among the layers that are wanted.
   int threads = 0;
   std::vector<std::uint8_t> layers;  ///< wanted ones, not 0; empty: all
   bool planes = true;                ///< false: poses only
@@ -51,6 +53,7 @@ struct PrefetchStats {
     int layer = -1;           ///< number of the layer; -1: the poses
     bool exponents = false;   ///< of that layer, else its mantissas
     std::uint64_t bytes = 0;  ///< of chunks that came
+    int decoders = 1;         ///< which take the segments in turn
   };
   std::vector<Track> tracks;
   std::uint64_t decoded_frames = 0;    ///< complete ones
@@ -99,6 +102,11 @@ class Prefetcher {
   /// clears an error, to try again. Never blocks.
   void want(std::uint64_t frame);
 
+  /// Until want() moves on from the first frame after the beginning or a jump, or asks for another
+  /// one, no more than two frames are decoded: the first picture has the machine to itself. This
+  /// fills the ring from now on. Never blocks.
+  void fetch_ahead();
+
   /// The frame, if it is decoded; null: not yet. Those from the wanted one on can be asked for.
   /// Where damage hit it, the last good one before it, and the loss is counted when the wanted
   /// frame is asked for. Null for the wanted frame counts as an underrun, once, unless playback
@@ -144,6 +152,8 @@ class Prefetcher {
   /// to: each stands for the ones between it and the next, which are decoded only where others
   /// refer to them. Frames that are in the ring stay. Requires n >= 1.
   void set_every(std::uint64_t n);
+  /// Other bounds than the PrefetchOptions'. What is there already stays until it has gone by.
+  void set_limits(std::size_t ring_bytes, std::size_t packet_bytes);
 
   [[nodiscard]] PrefetchStats stats() const;
   [[nodiscard]] PlaybackLoss loss() const;

@@ -55,6 +55,7 @@ Result<std::unique_ptr<Relighter>> Relighter::create(const container::ModelRecor
 Status Relighter::set_path(CompositePath path) {
   if (path != CompositePath::kAuto) {
     RELIT_TRY(prepare(path));
+    measuring_.reset();
     path_ = path;
     options_.path = path;
     return {};
@@ -69,6 +70,7 @@ Status Relighter::set_path(CompositePath path) {
   PathChooser chooser(available);
   RELIT_TRY(prepare(chooser.path()));
   chooser_ = chooser;
+  measuring_.reset();
   path_ = chooser_.path();
   options_.path = path;
   return {};
@@ -177,53 +179,75 @@ std::string Relighter::why() const {
   return std::string(composite_path_name(path_)) + ": asked for";
 }
 
+// Of what was composited: another path may have been set since.
 Status Relighter::draw(gles::CharacterRenderer& renderer, const gles::View& view) {
-  if (!faded_ && done_.valid && path_ == CompositePath::kFused) return renderer.draw(view, *fused_);
+  if (!faded_ && done_.valid && done_.path == CompositePath::kFused)
+    return renderer.draw(view, *fused_);
   RELIT_ASSIGN(const gles::LightMap map, texture());
   return renderer.draw(view, map);
 }
 
 bool Relighter::wants_measuring(double covered_pixels) {
-  return options_.path == CompositePath::kAuto && chooser_.wants_measuring(covered_pixels);
-}
-
-Status Relighter::measure(const FrameMix& mix, gles::CharacterRenderer& renderer,
-                          const gles::View& view) {
-  const CompositePath before = path_;
-  std::array<double, kCompositePaths> cost_s{};
-  for (const CompositePath path :
-       {CompositePath::kCpu, CompositePath::kTexture, CompositePath::kFused}) {
-    if (!chooser_.available(path)) continue;
-    const Result<double> cost = time_path(path, mix, renderer, view);
-    if (cost) cost_s[static_cast<std::size_t>(path)] = *cost;
-    if (!cost && path == before) return Unexpected{cost.error()};
-  }
-  chooser_.take(cost_s);
-  path_ = chooser_.path();
-  forget();
-  return composite(mix);
+  return options_.path == CompositePath::kAuto &&
+         (chooser_.wants_measuring(covered_pixels) || measuring_.has_value());
 }
 
 // The least of three, after one that compiles and allocates: what disturbs a measurement adds to
-// it.
+// it. Paths take turns, so that what goes on beside disturbs them all.
+Result<bool> Relighter::measure(const FrameMix& mix, gles::CharacterRenderer& renderer,
+                                const gles::View& view) {
+  constexpr std::size_t kRounds = 4, kPaths = kCompositePaths;
+  if (!measuring_) {
+    measuring_ = Measuring{};
+    measuring_->before = path_;
+  }
+  Measuring& m = *measuring_;
+  const auto skip = [&] {
+    while (m.step < kRounds * kPaths &&
+           (m.failed[m.step % kPaths] || !chooser_.available(CompositePath(m.step % kPaths))))
+      ++m.step;
+  };
+  bool drawn = false;
+  for (skip(); !drawn && m.step < kRounds * kPaths; skip()) {
+    const bool counts = m.step >= kPaths;
+    const std::size_t path = m.step++ % kPaths;
+    const Result<double> cost_s = time_path(CompositePath(path), mix, renderer, view);
+    drawn = cost_s.has_value();
+    double& least_s = m.least_s[path];
+    if (drawn && counts && (least_s == 0 || *cost_s < least_s)) least_s = *cost_s;
+    if (drawn) continue;
+    if (CompositePath(path) == m.before) {
+      measuring_.reset();
+      return Unexpected{cost_s.error()};
+    }
+    m.failed[path] = true;
+    least_s = 0;
+  }
+  if (m.step < kRounds * kPaths) return false;
+  RELIT_TRY(end_measuring(mix));
+  if (!drawn) RELIT_TRY(draw(renderer, view));
+  return true;
+}
+
+Status Relighter::end_measuring(const FrameMix& mix) {
+  chooser_.take(measuring_->least_s);
+  measuring_.reset();
+  path_ = chooser_.path();
+  return composite(mix);
+}
+
 Result<double> Relighter::time_path(CompositePath path, const FrameMix& mix,
                                     gles::CharacterRenderer& renderer, const gles::View& view) {
   using Clock = std::chrono::steady_clock;
-  constexpr int kRounds = 4;
   RELIT_TRY(prepare(path));
   path_ = path;
-  double least_s = 0;
-  for (int round = 0; round < kRounds; ++round) {
-    forget();
-    options_.device->gl().Finish();
-    const Clock::time_point start = Clock::now();
-    RELIT_TRY(composite(mix));
-    RELIT_TRY(draw(renderer, view));
-    options_.device->gl().Finish();
-    const double cost_s = std::chrono::duration<double>(Clock::now() - start).count();
-    if (round == 1 || (round > 1 && cost_s < least_s)) least_s = cost_s;
-  }
-  return least_s;
+  forget();
+  options_.device->gl().Finish();
+  const Clock::time_point start = Clock::now();
+  RELIT_TRY(composite(mix));
+  RELIT_TRY(draw(renderer, view));
+  options_.device->gl().Finish();
+  return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
 std::size_t Relighter::gpu_bytes() const {

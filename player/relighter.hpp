@@ -109,14 +109,17 @@ class Relighter {
   /// Takes another path, or kAuto. Errors: as create(); the old one stays.
   Status set_path(CompositePath path);
 
-  /// Whether measure() should be called: with kAuto, when nothing has been measured yet, or since
-  /// then the character has come to cover much more or less of the screen. Once a picture.
-  /// `covered_pixels` is an estimate, such as the area of the character's box.
+  /// Whether measure() should be called in place of draw(): with kAuto, when nothing has been
+  /// measured yet, or since then the character has come to cover much more or less of the screen.
+  /// Once a picture. `covered_pixels` is an estimate, such as the area of the character's box.
   [[nodiscard]] bool wants_measuring(double covered_pixels);
-  /// Draws `mix` a few times by every path that there is, into the framebuffer that is bound,
-  /// waiting for the GPU each time, and takes the path that PathChooser does. Errors: those of
-  /// drawing by the path that runs; others that fail are left out of account.
-  Status measure(const FrameMix& mix, gles::CharacterRenderer& renderer, const gles::View& view);
+  /// Composites and draws `mix` as draw() does, by the next of the paths that there are, and takes
+  /// the time, waiting for the GPU before and after. One picture a call, so that no picture takes
+  /// much longer than others. True: each path has been drawn a few times now, and the one that
+  /// PathChooser takes runs from here on; until then path() changes with every call. Errors: those
+  /// of drawing by the path that ran before; others that fail are left out of account.
+  Result<bool> measure(const FrameMix& mix, gles::CharacterRenderer& renderer,
+                       const gles::View& view);
 
   /// Forgets which frames it has. Needed when frames may come with the numbers and memory of
   /// others, as those of another clip of the same model would.
@@ -135,6 +138,13 @@ class Relighter {
     std::vector<const std::uint8_t*> samples;  // mantissas and exponents by plane; null: not there
     void set(const decoders::FrameView& view);
     [[nodiscard]] bool matches(const decoders::FrameView& view) const;
+  };
+  // How far measuring has come: rounds of all paths, one after the other.
+  struct Measuring {
+    std::size_t step = 0;
+    CompositePath before = CompositePath::kAuto;
+    std::array<bool, kCompositePaths> failed{};
+    std::array<double, kCompositePaths> least_s{};  // 0: none yet
   };
   // What the last composite was made of.
   struct Moment {
@@ -163,12 +173,14 @@ class Relighter {
   Status fade_on_cpu(Relighter& to, float weight);
   Result<double> time_path(CompositePath path, const FrameMix& mix,
                            gles::CharacterRenderer& renderer, const gles::View& view);
+  Status end_measuring(const FrameMix& mix);
 
   const container::ModelRecord* model_ = nullptr;
   std::span<const container::LayerRecord> layers_;
   RelightOptions options_;
   CompositePath path_ = CompositePath::kCpu;
   PathChooser chooser_;
+  std::optional<Measuring> measuring_;
 
   decoders::FoldedWeights folded_;  // as the light is
   bool has_light_ = false;

@@ -212,7 +212,7 @@ Status Relighter::read(std::span<float> out) {
     std::copy_n(faded_on_cpu_.begin(), size, out.begin());
   } else if (faded_) {
     RELIT_TRY(mixer_->read_back(out));
-  } else if (path_ == CompositePath::kCpu) {
+  } else if (done_.path == CompositePath::kCpu) {
     std::copy_n(composite_.begin(), size, out.begin());
   } else {
     RELIT_TRY(texture());
@@ -233,7 +233,7 @@ Status Relighter::fade(Relighter& to, float weight) {
     return fail(ErrorCode::kInvalid, "a fade needs both light maps composited");
   }
   if (weight == 0) return {};
-  if (path_ == CompositePath::kCpu && to.path_ == CompositePath::kCpu) {
+  if (done_.path == CompositePath::kCpu && to.done_.path == CompositePath::kCpu) {
     RELIT_TRY(fade_on_cpu(to, weight));
     has_faded_ = true;
     if (options_.device == nullptr) return {};

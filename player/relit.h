@@ -148,7 +148,8 @@ typedef struct relit_open_options {
   int32_t interpolate;  ///< 1 (default): light maps and poses are blended between frames
   int32_t path;         ///< relit_path; default RELIT_PATH_AUTO
   /// 0 (default): no bound. What cannot fit is refused with RELIT_OUT_OF_MEMORY, and the least
-  /// budget that would do is said. It holds for one clip; while two cross-fade, each may take it.
+  /// budget that would do is said. Sequences and cross-fades, of which two clips are in memory at
+  /// once, are planned when they are asked for: frames ahead, threads and layers may become fewer.
   uint64_t memory_budget_bytes;
   double target_fps;    ///< display rate that the governor defends; 0 (default): 60
   double quality;       ///< 0..1: fixed; negative (default): the governor chooses
@@ -330,10 +331,12 @@ typedef struct relit_sequence_entry {
 /// Plays one clip, from its beginning at the next relit_update(). With cross_fade_s > 0 light maps
 /// and poses blend over from what is playing (where the source cannot seek, it is a cut).
 /// RELIT_NOT_FOUND for a clip that is not there; RELIT_UNSUPPORTED for another one where the source
-/// cannot seek; RELIT_INVALID for a fade that is negative or not finite.
+/// cannot seek; RELIT_INVALID for a fade that is negative or not finite; RELIT_OUT_OF_MEMORY where
+/// the budget does not suffice for both clips. What played goes on then.
 RELIT_API relit_result relit_play_clip(relit_player* player, uint32_t clip,
                                        double cross_fade_s) RELIT_NOEXCEPT;
 /// Plays clips one after the other, `loop` (0 or 1) from the first again. `entries` is copied.
+/// Errors: as relit_play_clip().
 RELIT_API relit_result relit_play_sequence(relit_player* player,
                                            const relit_sequence_entry* entries, size_t count,
                                            int32_t loop) RELIT_NOEXCEPT;

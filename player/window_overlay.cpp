@@ -15,8 +15,6 @@ using gles::kTextHeight;
 using gles::OverlayCanvas;
 using gles::OverlayRect;
 
-constexpr float kMargin = 12, kPadding = 12;
-
 }  // namespace
 
 std::string_view format_time(double time_s, std::array<char, 32>& room) {
@@ -65,8 +63,8 @@ std::size_t fitting_line(std::string_view text, float width) {
 ControlLayout layout_controls(float width, float height) {
   ControlLayout layout;
   constexpr float kHeight = 40;
-  layout.panel = {kMargin, height - kMargin - kHeight, std::max(width - 2 * kMargin, 0.0f),
-                  kHeight};
+  layout.panel = {kPanelMargin, height - kPanelMargin - kHeight,
+                  std::max(width - 2 * kPanelMargin, 0.0f), kHeight};
   layout.pause = {layout.panel.x, layout.panel.y, 36, kHeight};
   // A time of seven figures on the left; on the right it has the frame beside it where there is
   // room.
@@ -118,7 +116,8 @@ void draw_controls(OverlayCanvas& canvas, const OverlayModel& model) {
 
 OverlayRect draw_message(OverlayCanvas& canvas, const OverlayModel& model) {
   const float visibility = std::clamp(model.message_visibility, 0.0f, 1.0f);
-  const float most = std::max(std::min(canvas.width() - 2 * (kMargin + kPadding), 520.0f), 40.0f);
+  const float most =
+      std::max(std::min(canvas.width() - 2 * (kPanelMargin + kPanelPadding), 520.0f), 40.0f);
   // Measured first, so that the panel lies below its text.
   float width = 0;
   int lines = 0;
@@ -134,12 +133,12 @@ OverlayRect draw_message(OverlayCanvas& canvas, const OverlayModel& model) {
     width = std::max(width, OverlayCanvas::text_width(line));
     ++lines;
   });
-  const OverlayRect panel{kMargin, kMargin, width + 2 * kPadding,
+  const OverlayRect panel{kPanelMargin, kPanelMargin, width + 2 * kPanelPadding,
                           static_cast<float>(lines) * kTextHeight + 14};
   canvas.panel(panel, faded(kPanel, visibility));
   float y = panel.y + 7;
   each_line([&](std::string_view line) {
-    canvas.text(panel.x + kPadding, y, line,
+    canvas.text(panel.x + kPanelPadding, y, line,
                 faded(model.message_is_error ? kBad : kText, visibility));
     y += kTextHeight;
   });
@@ -149,7 +148,7 @@ OverlayRect draw_message(OverlayCanvas& canvas, const OverlayModel& model) {
 OverlayRect draw_keys_panel(OverlayCanvas& canvas) {
   constexpr float kLine = 18, kColumn = 352, kWhat = 136, kGroupGap = 8;
   const std::vector<KeyHelp>& help = key_help();
-  const bool two = canvas.width() >= 2 * kColumn + 2 * (kMargin + kPadding);
+  const bool two = canvas.width() >= 2 * kColumn + 2 * (kPanelMargin + kPanelPadding);
   // Where the second column begins: the group at which both are about as long.
   std::size_t split = help.size();
   if (two) {
@@ -164,14 +163,14 @@ OverlayRect draw_keys_panel(OverlayCanvas& canvas) {
   };
   const float rows = std::max(length(0, split), length(split, help.size()));
   OverlayRect panel;
-  panel.width = (two ? 2 * kColumn : kColumn) + 2 * kPadding;
-  panel.height = rows + 2 * kPadding;
+  panel.width = (two ? 2 * kColumn : kColumn) + 2 * kPanelPadding;
+  panel.height = rows + 2 * kPanelPadding;
   panel.x = std::max(0.5f * (canvas.width() - panel.width), 0.0f);
   panel.y = std::max(0.5f * (canvas.height() - panel.height), 0.0f);
   canvas.panel(panel, kPanel);
-  float x = panel.x + kPadding, y = panel.y + kPadding;
+  float x = panel.x + kPanelPadding, y = panel.y + kPanelPadding;
   for (std::size_t i = 0; i < help.size(); ++i) {
-    if (i == split) x += kColumn, y = panel.y + kPadding;
+    if (i == split) x += kColumn, y = panel.y + kPanelPadding;
     const KeyHelp& entry = help[i];
     if (entry.keys == nullptr) {
       if (i != 0 && i != split) y += kGroupGap;

@@ -93,6 +93,9 @@ struct ControlLayout {
 /// Appends all that the model shows to a canvas that has begun its picture.
 void draw_overlay(gles::OverlayCanvas& canvas, const OverlayModel& model);
 
+/// Around panels and inside them, in points.
+inline constexpr float kPanelMargin = 12, kPanelPadding = 12;
+
 /// The panels by themselves: return the rectangle that they cover.
 gles::OverlayRect draw_keys_panel(gles::OverlayCanvas& canvas);
 gles::OverlayRect draw_statistics_panel(gles::OverlayCanvas& canvas, const OverlayModel& model);

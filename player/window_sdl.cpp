@@ -160,7 +160,7 @@ Status Window::open() {
 Status Window::run() {
   while (!leave_) {
     SDL_Event event;
-    while (SDL_PollEvent(&event) != 0) handle(event);
+    while (!leave_ && SDL_PollEvent(&event) != 0) handle(event);
     RELIT_TRY(serve_requests());
     if (leave_) break;
     RELIT_TRY(show());

@@ -13,7 +13,7 @@ using gles::OverlayCanvas;
 using gles::OverlayColor;
 using gles::OverlayRect;
 
-constexpr float kMargin = 12, kPadding = 12, kWidth = 348, kLabel = 84, kLine = 17;
+constexpr float kWidth = 348, kLabel = 84, kLine = 17;
 
 // Writes the panel from top to bottom; with `measuring` it only counts how long it is.
 class Column {
@@ -25,7 +25,7 @@ class Column {
   void gap(float height) { y_ += height; }
 
   void title(std::string_view left, std::string_view right) {
-    const float room = kWidth - 2 * kPadding - OverlayCanvas::text_width(right) - 12;
+    const float room = kWidth - 2 * kPanelPadding - OverlayCanvas::text_width(right) - 12;
     if (!measuring_) {
       canvas_.clip(OverlayRect{x_, y_, room, kTextHeight});
       canvas_.text(x_, y_, left, kAccent);
@@ -40,7 +40,7 @@ class Column {
     if (!measuring_) canvas_.text(x_, y_, label, kDim);
     if (value.empty()) y_ += kLine;
     while (!value.empty()) {
-      const std::size_t length = fitting_line(value, kWidth - 2 * kPadding - kLabel);
+      const std::size_t length = fitting_line(value, kWidth - 2 * kPanelPadding - kLabel);
       if (!measuring_) canvas_.text(x_ + kLabel, y_, value.substr(0, length), color);
       value.remove_prefix(length);
       while (!value.empty() && value.front() == ' ') value.remove_prefix(1);
@@ -53,7 +53,7 @@ class Column {
     constexpr float kValue = 136;
     if (!measuring_) {
       canvas_.text(x_, y_, label, kDim);
-      const float width = kWidth - 2 * kPadding - kLabel - kValue;
+      const float width = kWidth - 2 * kPanelPadding - kLabel - kValue;
       const OverlayRect track{x_ + kLabel, y_ + 6, width, 6};
       canvas_.rect(track, kTrack);
       const auto part = static_cast<float>(std::clamp(fraction, 0.0, 1.0));
@@ -67,8 +67,8 @@ class Column {
   void graph(const History& history, float most, float line, OverlayColor color) {
     constexpr float kHeight = 36;
     if (!measuring_) {
-      const float column = (kWidth - 2 * kPadding) / static_cast<float>(History::kLength);
-      canvas_.rect({x_, y_, kWidth - 2 * kPadding, kHeight}, kTrack);
+      const float column = (kWidth - 2 * kPanelPadding) / static_cast<float>(History::kLength);
+      canvas_.rect({x_, y_, kWidth - 2 * kPanelPadding, kHeight}, kTrack);
       for (std::size_t i = 0; i < History::kLength; ++i) {
         const float value = history.back(History::kLength - 1 - i);
         const float height = kHeight * std::clamp(value / most, 0.0f, 1.0f);
@@ -77,13 +77,13 @@ class Column {
                      line > 0 && value > 1.5f * line ? kBad : color);
       }
       if (line > 0)
-        canvas_.rect({x_, y_ + kHeight * (1 - line / most), kWidth - 2 * kPadding, 1}, kAhead);
+        canvas_.rect({x_, y_ + kHeight * (1 - line / most), kWidth - 2 * kPanelPadding, 1}, kAhead);
     }
     y_ += kHeight + 6;
   }
 
  private:
-  [[nodiscard]] float right_edge() const { return x_ + kWidth - 2 * kPadding; }
+  [[nodiscard]] float right_edge() const { return x_ + kWidth - 2 * kPanelPadding; }
 
   OverlayCanvas& canvas_;
   float x_, y_;
@@ -170,13 +170,13 @@ void write(Column& column, const OverlayModel& model) {
 OverlayRect draw_statistics_panel(OverlayCanvas& canvas, const OverlayModel& model) {
   OverlayRect panel;
   panel.width = kWidth;
-  panel.x = std::max(canvas.width() - kMargin - kWidth, 0.0f);
-  panel.y = kMargin;
-  Column measured(canvas, panel.x + kPadding, panel.y + kPadding, true);
+  panel.x = std::max(canvas.width() - kPanelMargin - kWidth, 0.0f);
+  panel.y = kPanelMargin;
+  Column measured(canvas, panel.x + kPanelPadding, panel.y + kPanelPadding, true);
   write(measured, model);
-  panel.height = measured.y() + kPadding - panel.y;
+  panel.height = measured.y() + kPanelPadding - panel.y;
   canvas.panel(panel, kPanel);
-  Column column(canvas, panel.x + kPadding, panel.y + kPadding, false);
+  Column column(canvas, panel.x + kPanelPadding, panel.y + kPanelPadding, false);
   write(column, model);
   return panel;
 }

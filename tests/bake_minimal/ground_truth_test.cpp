@@ -110,7 +110,7 @@ void compare_frame(const PreparedBake& prepared, std::uint64_t frame, int bounce
       return static_cast<float>(1 - b1 - b2) * v[i[0]] + static_cast<float>(b1) * v[i[1]] +
              static_cast<float>(b2) * v[i[2]];
     };
-    const Surface& surface = truth.geometry.surfaces[truth.geometry.surface[truth.kept[t]]];
+    const HitSurface& surface = truth.geometry.surfaces[truth.geometry.surface[truth.kept[t]]];
     return glm::dvec3(
         surface_albedo(surface, mix(truth.geometry.albedo_uv), mix(truth.geometry.colors)));
   };

@@ -161,7 +161,7 @@ TEST_CASE("a wall shades the floor by its view factor, and bounces its colour") 
   // A floor point at distance 1 from a wall too high and too wide to see past (400 m): half of the
   // sky is covered, cos-weighted: F = 1/2. The wall itself sees half a sky and the floor below.
   QuadScene scene;
-  Surface red;
+  HitSurface red;
   red.base_color = glm::vec4(0.8f, 0.2f, 0.0f, 1.0f);
   scene.geometry.surfaces.push_back(red);
   const std::size_t floor = add_square(scene, glm::vec3(0), glm::vec3(0, 1, 0), 0.05f);
@@ -244,7 +244,7 @@ TEST_CASE("masked texels let light through") {
   Image image;
   image.width = 2, image.height = 1;
   image.rgba = {255, 255, 255, 255, 255, 255, 255, 0};
-  Surface leaf;
+  HitSurface leaf;
   leaf.image = &image, leaf.masked = true, leaf.linear_filter = false;
   leaf.wrap_u = leaf.wrap_v = container::Wrap::kClamp;
   const auto floor_light = [&](bool masked) {

@@ -26,7 +26,7 @@ struct Checked {
   double density_p5 = 0, density_p95 = 0;
 };
 
-Result<Unwrapped> unwrap_mesh(const Mesh& m, const PackOptions& options) {
+Result<Unwrapped> unwrap_mesh(const Mesh& m, const ChartPackOptions& options) {
   const std::vector<std::uint32_t> group(m.positions.size(), 0);
   return unwrap_surface({m.positions, m.normals, group, m.indices}, options);
 }
@@ -46,7 +46,7 @@ double density_of(const Mesh& m, const std::vector<glm::vec2>& uv, std::size_t t
 }
 
 // The promises of unwrap_surface(), by the exact rasteriser.
-Checked require_valid(const Mesh& m, const PackOptions& options) {
+Checked require_valid(const Mesh& m, const ChartPackOptions& options) {
   auto result = unwrap_mesh(m, options);
   if (!result) FAIL(result.error().message);
   Checked out{*std::move(result)};
@@ -157,8 +157,8 @@ TEST_CASE("loose triangles smaller than texels get texels of their own") {
 TEST_CASE("the atlas may be any rectangle and the gutter any width") {
   Mesh m = shapes::torus(24, 12);
   shapes::append(m, shapes::box(glm::vec3(0.5f)), {3, 0, 0});
-  for (const PackOptions& o : {PackOptions{256, 64, 2}, PackOptions{48, 200, 2},
-                               PackOptions{128, 128, 5}, PackOptions{128, 128, 0}}) {
+  for (const ChartPackOptions& o : {ChartPackOptions{256, 64, 2}, ChartPackOptions{48, 200, 2},
+                                    ChartPackOptions{128, 128, 5}, ChartPackOptions{128, 128, 0}}) {
     require_valid(m, o);
   }
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
-// From relit_open() with a context current to the first picture, stage by stage: medians of many
-// openings of a local file, the driver's shader cache warm after the first.
+// From relit_open() with a context current to the first picture, stage by stage: medians and
+// quartiles of many openings of a local file, the driver's shader cache warm after the first.
+// Beside the time on the clock, the processor time of the calling thread and of the whole process,
+// which other programs on the machine disturb less.
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -20,9 +22,10 @@ namespace {
 using relit::gles::GetProcAddress;
 using Clock = std::chrono::steady_clock;
 
-double median(std::vector<double> values) {
+double quantile(std::vector<double> values, double share) {
   std::sort(values.begin(), values.end());
-  return values[values.size() / 2];
+  const auto last = static_cast<double>(values.size() - 1);
+  return values[static_cast<std::size_t>(share * last + 0.5)];
 }
 
 constexpr std::size_t kStages = 4;
@@ -31,14 +34,14 @@ constexpr const char* kNames[kStages] = {"relit_open: statics, meshes, decoders,
                                          "relit_update: the first frame here, posed, composited",
                                          "relit_draw: shaders, drawing, glFinish"};
 
-double thread_ms() {
+double processor_ms(clockid_t clock) {
   timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  clock_gettime(clock, &now);
   return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
 }
 
 struct Stages {
-  std::array<double, kStages> wall{}, thread{};
+  std::array<double, kStages> wall{}, thread{}, process{};
 };
 
 // Ends a stage.
@@ -46,15 +49,18 @@ class Watch {
  public:
   void lap(Stages& stages, std::size_t stage) {
     const Clock::time_point now = Clock::now();
-    const double thread = thread_ms();
+    const double thread = processor_ms(CLOCK_THREAD_CPUTIME_ID);
+    const double process = processor_ms(CLOCK_PROCESS_CPUTIME_ID);
     stages.wall[stage] = std::chrono::duration<double, std::milli>(now - wall_).count();
     stages.thread[stage] = thread - thread_;
-    wall_ = now, thread_ = thread;
+    stages.process[stage] = process - process_;
+    wall_ = now, thread_ = thread, process_ = process;
   }
 
  private:
   Clock::time_point wall_ = Clock::now();
-  double thread_ = thread_ms();
+  double thread_ = processor_ms(CLOCK_THREAD_CPUTIME_ID);
+  double process_ = processor_ms(CLOCK_PROCESS_CPUTIME_ID);
 };
 
 void require(relit_result result, relit_player* player, const char* what) {
@@ -111,20 +117,27 @@ int main(int argc, char** argv) {
   relit_view_default(&view, sizeof view);
   view.width = view.height = 512;
   view.background = RELIT_BACKGROUND_TRANSPARENT;
-  std::array<std::vector<double>, kStages + 1> wall, thread;
+  std::array<std::vector<double>, kStages + 1> wall, thread, process;
   for (int i = 0; i <= rounds; ++i) {
     const Stages stages = show_first(path, find, view, (*device)->gl());
     if (i == 0) continue;  // fills the shader cache
-    for (std::size_t s = 0; s < kStages; ++s) {
-      wall[s].push_back(stages.wall[s]);
-      thread[s].push_back(stages.thread[s]);
-    }
-    wall[kStages].push_back(std::accumulate(stages.wall.begin(), stages.wall.end(), 0.0));
-    thread[kStages].push_back(std::accumulate(stages.thread.begin(), stages.thread.end(), 0.0));
+    const auto add = [](auto& lists, const std::array<double, kStages>& values) {
+      for (std::size_t s = 0; s < kStages; ++s) lists[s].push_back(values[s]);
+      lists[kStages].push_back(std::accumulate(values.begin(), values.end(), 0.0));
+    };
+    add(wall, stages.wall);
+    add(thread, stages.thread);
+    add(process, stages.process);
   }
-  std::printf("first picture, median of %d openings of %s\n", rounds, path);
-  for (std::size_t s = 0; s <= kStages; ++s)
-    std::printf("  %7.2f ms, %7.2f ms of this thread's  %s\n", median(wall[s]), median(thread[s]),
-                s < kStages ? kNames[s] : "in all");
+  double load = 0;
+  (void)getloadavg(&load, 1);
+  std::printf("first picture of %s: median (quartiles) of %d openings, load %.1f\n", path, rounds,
+              load);
+  std::printf("%25s  %8s %8s\n", "ms", "thread", "process");
+  for (std::size_t s = 0; s <= kStages; ++s) {
+    std::printf("  %7.2f (%6.2f, %6.2f)  %8.2f %8.2f  %s\n", quantile(wall[s], 0.5),
+                quantile(wall[s], 0.25), quantile(wall[s], 0.75), quantile(thread[s], 0.5),
+                quantile(process[s], 0.5), s < kStages ? kNames[s] : "in all");
+  }
   return 0;
 }

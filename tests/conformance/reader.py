@@ -4,10 +4,9 @@
 
 info prints the parsed structure (status 0: all was read; 1: the file cannot be used; 3: records
 were lost). frames prints hashes of decoded planes, coefficients at probe texels and posed positions
-(status 0 or 1). Needs only the standard library, libzstd, libmeshoptimizer and the command ffmpeg.
-"""
-import collections, contextlib, ctypes, io, itertools, json, math, pathlib, re, struct
-import subprocess, sys, zlib
+(status 0 or 1). Needs only the standard library, libzstd, libmeshoptimizer and libavcodec."""
+import collections, contextlib, ctypes, ctypes.util, io, itertools, json, math, pathlib, re, struct
+import sys, zlib
 
 SIGNATURE, MARKER = b"\x89RLT\r\n\x1a\n", bytes.fromhex("F3529C0BE6D17A38C41FA9650EB2875D")
 # The static types behind HEAD in their order: names in INFO.md, and how many a file may have.
@@ -22,11 +21,12 @@ class Refuse(ValueError):
 class Framing(Refuse):
     """The framing is lost at this place."""
 
+def signed(zigzag): return zigzag >> 1 ^ -(zigzag & 1)
+def affine(offset, step, integers): return [o + k * i for o, k, i in zip(offset, step, integers)]
+def distinct(values): return len(set(values)) == len(values)
+
 def need(condition, what, error=Refuse):
     if not condition: raise error(what)
-
-def distinct(values):
-    return len(set(values)) == len(values)
 
 # Payloads, section 4 ------------------------------------------------------------------------------
 # A layout lists fields as name:code, the code being one of struct's, string, bytes, bool, another
@@ -74,7 +74,6 @@ FIELDS = {layout: [FIELD.fullmatch(field).groups() for field in fields]
           for layout, *fields in map(str.split, LAYOUTS.replace("\n  ", " ").strip().split("\n"))}
 
 class Payload(io.BytesIO):
-    """A payload that is read from its first byte on."""
     def take(self, n):
         raw = self.read(n)
         need(len(raw) == n, "shorter than its fields")
@@ -111,8 +110,7 @@ class Payload(io.BytesIO):
 
 def parse(layout, raw):
     """What a payload, None being a damaged one, holds by the names of its layout."""
-    payload = Payload(raw)      # None is as if it were empty
-    d = payload.record(layout)
+    d = (payload := Payload(raw)).record(layout)        # None is as if it were empty
     need(not payload.read(1), f"{layout}: longer than its fields")
     return d
 
@@ -211,11 +209,7 @@ def record_at(data, at):
     good = zlib.crc32(body) == crc and not any(data[at + 24 + length:end])
     return Record(at, flags, kind.decode(), length, crc, body if good else None, end)
 
-def signed(zigzag):
-    return zigzag >> 1 ^ -(zigzag & 1)
-
-def varints(raw):
-    """All numbers of a table."""
+def varints(raw):               # all numbers of a table
     codes = re.findall(rb"[\x00-\x7f]|[\x80-\xff]{1,8}[\x01-\x7f]|[\x80-\xff]{9}\x01", raw)
     need(b"".join(codes) == raw, "not the shortest form, or beyond 64 bits")
     return [sum((byte & 127) << 7 * i for i, byte in enumerate(c)) for c in codes]
@@ -294,8 +288,7 @@ class File:
             self.lost.update(records=1 + len(self.awaited), bytes=max(0, found - at))
         self.awaited, self.rank, self.suspect = [], ORDER.index("SEGM"), 0
         return found
-    def copies(self):
-        """Yields the copies of the static records behind HEAD."""
+    def copies(self):           # yields those of the static records behind HEAD
         end = record_at(self.data, self.size - 48)
         need(end.type == "FEND", "no FEND leads to copies")
         r = record_at(self.data, parse("FEND", end.body)["copies_offset"])
@@ -339,7 +332,11 @@ class File:
             frames = range(s["first_frame"], s["first_frame"] + s["frames"])
             need(keys[0] and times[0] == frames[0] and set(times) <= set(frames), "packets")
         announced.update(packets=[*zip(times, keys, sizes)], data=b"".join(packets))
-        times = [time - s["first_frame"] for time in times]
+        first, end = s["first_frame"], s["first_frame"] + s["frames"]
+        for t in [t for t in self.segments[:-1] if (t["index"], d["track"]) in self.packets]:
+            if first == t["first_frame"]: del self.packets[t["index"], d["track"]]
+            elif first < t["first_frame"] + t["frames"] and t["first_frame"] < end: return
+        times = [time - first for time in times]
         self.packets[s["index"], d["track"]] = dict(zip(times, packets))
     def info(self):
         s, chunks = self.records, [c for segment in self.segments for c in segment["chunks"]]
@@ -353,43 +350,51 @@ class File:
                 "end": self.end, "passed_over": self.passed}
 
 # Video, sections 3.3 and 3.4 ----------------------------------------------------------------------
-MATROSKA = {"h264": b"V_MPEG4/ISO/AVC", "hevc": b"V_MPEGH/ISO/HEVC", "av1": b"V_AV1",
-            "vp9": b"V_VP9", "mpeg4": b"V_MPEG4/ISO/ASP", "ffv1": b"V_FFV1"}
-# Pictures stay as they are, but packed B, G, R, 0 becomes planes of G, B, R.
-FFMPEG = ("ffmpeg -hide_banner -threads 1 -err_detect crccheck+explode -ec 0 -idct simple "
-          "-flags bitexact -f matroska -i pipe:0 -map 0:v:0 -fps_mode passthrough -autoscale 0 "
-          "-vf showinfo,format=gray|gray10|yuv420p|yuvj420p|yuv420p10|yuv444p|yuvj444p|yuv444p10|"
-          "gbrp|gbrp10 -fs 2000000000 -f rawvideo pipe:1").split()
-SHOWINFO = re.compile(rb" pts: *(\d+) .* fmt:(?:yuvj?)?(gray|420p|444p|gbrp|bgr0)(10le)? .*"
-                      rb"\bs:(\d+)x(\d+) ")
-# Chroma, and of each component the samples of component 0 that one of its own stands for.
-FORMATS = {b"gray": ("luma", [1]), b"420p": ("4:2:0", [1, 2, 2])}
+# libavcodec decodes; fields of its structures lie, in bytes, where versions from 59 on have them.
+class Pointer(ctypes.c_void_p):
+    def at(self, offset, kind=ctypes.c_int): return kind.from_address(self.value + offset).value
 
-def matroska(track, packets):
-    """A file of one video track; packets by time in ms."""
-    def el(name, *parts):
-        body = b"".join(p.to_bytes(8, "big") if isinstance(p, int) else p for p in parts)
-        return bytes.fromhex(name) + (len(body) | 1 << 56).to_bytes(8, "big") + body
-    entry = el("AE", el("D7", 1), el("73C5", 1), el("83", 1), el("86", MATROSKA[track["codec"]]),
-               el("63A2", track["codec_private"]), el("E0", *map(el, ("B0", "BA"), track["coded"])))
-    blocks = [el("1F43B675", el("E7", time), el("A3", b"\x81\0\0\x80", body))
-              for time, body in packets.items() if body]
-    return el("1A45DFA3", el("4282", b"matroska")) + el("18538067", el("1654AE6B", entry), *blocks)
+AV, memory = ctypes.CDLL(ctypes.util.find_library("avcodec")), ctypes.create_string_buffer
+for function in (AV.avcodec_descriptor_get_by_name, AV.avcodec_find_decoder, AV.av_frame_alloc,
+                 AV.avcodec_alloc_context3): function.restype = Pointer
+AV.av_get_pix_fmt_name.restype = ctypes.c_char_p
+OPTIONS = b"threads 1, err_detect crccheck+explode, ec 0, idct simple, flags bitexact".split(b", ")
+# Chroma, and of each component plane, first sample, step, and samples of component 0 for its own.
+FORMATS = {b"gray": ("luma", [(0, 0, 1, 1)]), b"bgr0": ("4:4:4", [(0, i, 4, 1) for i in (1, 0, 2)]),
+           b"yuv420p": ("4:2:0", [(0, 0, 1, 1), (1, 0, 1, 2), (2, 0, 1, 2)]),
+           **dict.fromkeys((b"yuv444p", b"gbrp"), ("4:4:4", [(i, 0, 1, 1) for i in range(3)]))}
+
+def open_decoder(track):
+    kind = AV.avcodec_descriptor_get_by_name(track["codec"].encode())
+    need(kind and (codec := AV.avcodec_find_decoder(kind.at(0))), f"no decoder: {track['codec']}")
+    context, extra = AV.avcodec_alloc_context3(codec), memory(track["codec_private"] + bytes(64))
+    gap = 28 if AV.avcodec_version() < 60 << 16 | 30 << 8 else 44
+    fields = (0, kind.at(0), ctypes.addressof(extra), len(extra) - 65, *track["coded"], 0, 1)
+    AV.avcodec_parameters_to_context(context, memory(struct.pack(f"<2i8xQi{gap}x4i", *fields), 512))
+    for option in OPTIONS: AV.av_opt_set(context, *option.split(), 0)
+    need(AV.avcodec_open2(context, codec, None) == 0, "codec_private")
+    return context
 
 def pictures(track, packets):
     """By time the components, as rows of samples, of the pictures that are as announced."""
-    need(track["codec"] in MATROSKA, f"no decoder for {track['codec']}")
-    done = subprocess.run(FFMPEG, input=matroska(track, packets), capture_output=True, check=False)
-    need(not re.search(b"opening decoder|Unknown decoder", done.stderr), "no such codec")
-    out, result = io.BytesIO(done.stdout), {}
-    for time, kind, deep, w, h in SHOWINFO.findall(done.stderr):
-        chroma, scales = FORMATS.get(kind, ("4:4:4", [1, 1, 1]))
-        w, h, sample = int(w), int(h), "H" if deep else "B"
-        components = [[memoryview(out.read(-(-w // n) * struct.calcsize(sample))).cast(sample)
-                       for _ in range(-(-h // n))] for n in scales]
-        if ([w, h, 10 if deep else 8] == [*track["coded"], track["bit_depth"]]
-                and track["chroma"] in ("luma", chroma)):
-            result[int(time)] = components
+    result, context, frame = {}, open_decoder(track), AV.av_frame_alloc()
+    for time, body in [*((t, b) for t, b in packets.items() if b), (0, None)]:
+        data = memory((body or b"") + bytes(64))        # None: the end, what was kept back comes
+        packet = struct.pack("<8xqqQi", time, time, ctypes.addressof(data), len(data) - 65)
+        sent = AV.avcodec_send_packet(context, body and memory(packet, 256))
+        while sent == 0 and AV.avcodec_receive_frame(context, frame) == 0:
+            w, h = frame.at(104), frame.at(108)
+            name = (AV.av_get_pix_fmt_name(frame.at(116)) or b"").replace(b"yuvj", b"yuv")
+            chroma, places = FORMATS.get(name.removesuffix(b"10le"), ("", []))
+            sample, depth = ("H", 10) if name.endswith(b"10le") else ("B", 8)
+            if (places and [w, h, depth] == [*track["coded"], track["bit_depth"]]
+                    and track["chroma"] in ("luma", chroma)):
+                result[frame.at(136, ctypes.c_int64)] = [[memoryview(ctypes.string_at(
+                    frame.at(8 * plane, ctypes.c_void_p) + y * frame.at(64 + 4 * plane),
+                    -(-w // n) * step * (depth + 7 >> 3))[first::step]).cast(sample)
+                    for y in range(-(-h // n))] for plane, first, step, n in places]
+    AV.av_frame_free(ctypes.byref(frame))
+    AV.avcodec_free_context(ctypes.byref(context))
     return result
 
 def decode(file, segment, track, areas, probes):
@@ -454,8 +459,7 @@ def unzstd(raw, least, most):
     z, length = ctypes.CDLL("libzstd.so.1"), ctypes.c_size_t(len(raw))
     z.ZSTD_getFrameContentSize.restype = ctypes.c_ulonglong
     size = z.ZSTD_getFrameContentSize(raw, length)
-    need(least <= size <= most, "zstd: size")
-    need(z.ZSTD_findFrameCompressedSize(raw, length) == len(raw), "zstd: not one frame")
+    need(least <= size <= most and z.ZSTD_findFrameCompressedSize(raw, length) == len(raw), "zstd")
     out = ctypes.create_string_buffer(size)
     need(z.ZSTD_decompress(out, ctypes.c_size_t(size), raw, length) == size, "zstd: damaged")
     return out.raw
@@ -472,9 +476,6 @@ def meshopt(raw, count, layout, codec="VertexBuffer", first=b"\xa0"):
 
 def bounded(offset, step, top=65535, limit=1e9):
     need(all(abs(o) <= limit and abs(o + k * top) <= limit for o, k in zip(offset, step)), "bounds")
-
-def affine(offset, step, integers):
-    return [o + k * i for o, k, i in zip(offset, step, integers)]
 
 def open_mesh(mesh, palette):
     """First four vertices: (position, morph deltas, [(palette entry, weight)]); checks all."""
@@ -496,8 +497,7 @@ def open_mesh(mesh, palette):
               for pair in zip(joints[i], weights[i]) if pair[1]])
             for i, p in enumerate(positions)]
 
-def product(a, b):
-    """Of row-major 3×4 matrices."""
+def product(a, b):              # of row-major 3×4 matrices
     return [sum(a[r + k] * b[4 * k + c] for k in range(3)) + (a[r + 3] if c == 3 else 0)
             for r in (0, 4, 8) for c in range(4)]
 

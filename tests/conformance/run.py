@@ -4,14 +4,17 @@
 
 import argparse
 import concurrent.futures
+import functools
 import json
 import math
 import os
 import pathlib
 import re
+import select
 import shlex
 import subprocess
 import sys
+import threading
 
 HERE = pathlib.Path(__file__).resolve().parent
 
@@ -26,6 +29,7 @@ def arguments():
                        ("validate", "prints findings as JSON"),
                        ("frames", "prints decoded frames as JSON")):
         parser.add_argument(f"--{name}", metavar="COMMAND", help=f"{what}; {{}} stands for the file")
+    parser.add_argument("--serve", metavar="COMMAND", help="a server that runs the others; started once a job")
     parser.add_argument("--vectors", type=pathlib.Path, default=HERE / "vectors", metavar="FOLDER")
     parser.add_argument("--only", default="", metavar="LETTERS", help="vectors whose names begin so")
     parser.add_argument("--timeout", type=float, default=60, metavar="SECONDS", help="of each command")
@@ -36,19 +40,68 @@ def arguments():
     return parser.parse_args()
 
 
-def run(command, path, timeout):
-    """Exit status and standard output; a crash or a hang is a mismatch for every vector."""
-    words = [word.replace("{}", str(path)) for word in shlex.split(command)]
-    if "{}" not in command:
-        words.append(str(path))
-    try:
-        done = subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True, timeout=timeout,
-                              check=False)
-    except subprocess.TimeoutExpired:
-        raise Mismatch(f"still running after {timeout:g} s") from None
-    if done.returncode < 0 or done.returncode > 125:
-        raise Mismatch(f"crashed with status {done.returncode}")
-    return done.returncode, done.stdout
+class Server:
+    """A process that runs one command after the other; README.md says how one talks to it."""
+
+    def __init__(self, command):
+        self.process = subprocess.Popen(shlex.split(command), stdin=subprocess.PIPE,
+                                        stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+
+    def run(self, words, timeout):
+        self.process.stdin.write(json.dumps(words).encode() + b"\n")
+        self.process.stdin.flush()
+        if not select.select([self.process.stdout], [], [], timeout)[0]:
+            raise subprocess.TimeoutExpired(words, timeout)
+        done = json.loads(self.process.stdout.readline() or '{"status": -1, "output": ""}')
+        return done["status"], done["output"]
+
+    def stop(self):
+        self.process.stdin.close()
+        self.process.kill()
+        self.process.wait()
+
+
+class Runner:
+    """Runs commands, for each thread with a server of its own if there is one."""
+
+    def __init__(self, serve, timeout):
+        self.serve, self.timeout = serve, timeout
+        self.servers = {}
+
+    def run(self, command, path):
+        """Exit status and standard output; a crash or a hang is a mismatch for every vector."""
+        words = [word.replace("{}", str(path)) for word in shlex.split(command)]
+        if "{}" not in command:
+            words.append(str(path))
+        try:
+            status, output = self.serving(words) if self.serve else self.starting(words)
+        except subprocess.TimeoutExpired:
+            raise Mismatch(f"still running after {self.timeout:g} s") from None
+        except BrokenPipeError:
+            raise Mismatch("the server is gone") from None
+        if status < 0 or status > 125:
+            raise Mismatch(f"crashed with status {status}")
+        return status, output
+
+    def starting(self, words):
+        done = subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True,
+                              timeout=self.timeout, check=False)
+        return done.returncode, done.stdout
+
+    def serving(self, words):
+        thread = threading.get_ident()
+        server = self.servers.pop(thread, None) or Server(self.serve)
+        try:
+            done = server.run(words, self.timeout)
+        except BaseException:  # one that does not answer is of no more use
+            server.stop()
+            raise
+        self.servers[thread] = server
+        return done
+
+    def stop(self):
+        for server in self.servers.values():
+            server.stop()
 
 
 def parsed(output):
@@ -82,8 +135,8 @@ def compare(expected, got, where, tolerance):
         raise Mismatch(f"{where} is {json.dumps(got)}, not {json.dumps(expected)}")
 
 
-def check_info(vector, command, path, timeout):
-    status, output = run(command, path, timeout)
+def check_info(vector, run):
+    status, output = run()
     if vector["outcome"] == "whole":
         if status != 0:
             raise Mismatch(f"ends with status {status}, the file can be read")
@@ -96,8 +149,8 @@ def check_info(vector, command, path, timeout):
         raise Mismatch("does not print what is left")
 
 
-def check_validate(vector, command, path, timeout):
-    status, output = run(command, path, timeout)
+def check_validate(vector, run):
+    status, output = run()
     report = parsed(output)
     files = report.get("files", [report])
     got = {finding["id"] for file in files for finding in file["findings"]}
@@ -110,8 +163,8 @@ def check_validate(vector, command, path, timeout):
         raise Mismatch(", ".join(problems))
 
 
-def check_frames(vector, command, path, timeout):
-    status, output = run(command, path, timeout)
+def check_frames(vector, run):
+    status, output = run()
     if vector["frames"] is None:
         if status == 0:
             raise Mismatch("decodes what cannot be decoded")
@@ -125,12 +178,12 @@ def check_frames(vector, command, path, timeout):
 CHECKS = {"info": check_info, "validate": check_validate, "frames": check_frames}
 
 
-def check(path, commands, timeout):
+def check(path, commands, runner):
     vector = json.loads(path.read_text())
     results = {}
     for name, command in commands.items():
         try:
-            CHECKS[name](vector, command, path.with_suffix(".relit"), timeout)
+            CHECKS[name](vector, functools.partial(runner.run, command, path.with_suffix(".relit")))
             results[name] = None
         except Mismatch as mismatch:
             results[name] = str(mismatch)
@@ -156,8 +209,10 @@ def main():
     if not commands:
         print("run.py: name at least one of --info, --validate and --frames", file=sys.stderr)
         return 2
+    runner = Runner(options.serve, options.timeout)
     with concurrent.futures.ThreadPoolExecutor(max(1, options.jobs)) as pool:
-        checked = list(pool.map(lambda p: check(p, commands, options.timeout), paths))
+        checked = list(pool.map(lambda p: check(p, commands, runner), paths))
+    runner.stop()
 
     width = max(len(path.stem) for path in paths)
     print(f"{'vector':{width}}  " + "  ".join(f"{name:8}" for name in commands))

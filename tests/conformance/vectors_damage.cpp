@@ -209,6 +209,10 @@ void add_unknown(Vectors& vectors) {
               refused({"FRAMING_CRITICAL_TYPE"}), insert(unknown("MyTE"), types::kClip));
   from_pieces(vectors, "unknown-critical-later", "an unknown critical record between segments",
               lossy({"FRAMING_CRITICAL_TYPE"}), insert(unknown("MTRK"), types::kSegment, 1));
+  from_pieces(vectors, "unknown-critical-inside-segment",
+              "an unknown critical record between SEGM and CHNK: reading ends there",
+              lossy({"FRAMING_CRITICAL_TYPE", "CHNK_ANNOUNCED"}),
+              insert(unknown("MTRK"), types::kChunk, 2));
   from_pieces(vectors, "unknown-inside-segment", "an ancillary record between SEGM and CHNK",
               lossy({"CHNK_ANNOUNCED", "FRAMING_UNKNOWN_RECORD"}),
               insert(unknown("nOTE"), types::kChunk));

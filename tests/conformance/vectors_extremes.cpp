@@ -84,6 +84,22 @@ void add_rigs(Vectors& vectors) {
     streams.push_back({Semantic::kAlbedoUv, 4, {-1, 2, 0}, {1e-3f, 1e-3f, 1}, four({1, 2, 3, 4})});
     streams.push_back({Semantic::kColor, 4, {}, {1, 1, 1}, four({255, 128, 0, 200})});
   });
+  good(vectors, "mesh-padding", "what stands in the place of zeros means nothing", [](Draft& d) {
+    // A square of seven steps, and a normal along +Y.
+    const std::vector<std::uint8_t> corners{0, 0, 0, 0, 0, 0, 9, 1, 7, 0, 0, 0, 0, 0, 255, 255,
+                                            7, 0, 7, 0, 0, 0, 1, 0, 0, 0, 7, 0, 0, 0, 0,   128};
+    const std::vector<std::uint8_t> normals{0, 127, 1,   2,   0, 127, 0, 0,
+                                            0, 127, 128, 127, 0, 127, 3, 255};
+    auto& streams = d.meshes[0].streams;
+    for (auto& stream : streams) {
+      if (stream.semantic != Semantic::kPosition) continue;
+      stream.offset = {0, 0, 0};
+      stream.scale = {0.125f, 0.125f, 0.125f};
+      stream.bytes = bake::encode_vertex_stream(corners, 8);
+    }
+    streams.push_back(
+        {Semantic::kNormal, 4, {}, {1, 1, 1}, bake::encode_vertex_stream(normals, 4)});
+  });
 }
 
 /// Adds the parts of another clip to a file.

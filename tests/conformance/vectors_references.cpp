@@ -161,6 +161,34 @@ void add_segments(Vectors& vectors) {
                d.segments[1].record.index = 1;
                d.clips[0].frame_count = d.clips[0].duration_ticks = 2;
              });
+  FigureOptions four = plain_figure();
+  four.frames = 4;
+  // Other frames in the place of those of the first segment.
+  const auto again = [](Draft& d, std::uint64_t first_frame) {
+    DraftSegment& segment = d.segments[1];
+    for (ChunkRecord& chunk : segment.chunks)
+      for (Packet& packet : chunk.packets)
+        packet.pts += static_cast<std::int64_t>(first_frame) -
+                      static_cast<std::int64_t>(segment.record.first_frame);
+    segment.record.first_frame = segment.record.first_tick = first_frame;
+    d.clips[0].frame_count = d.clips[0].duration_ticks = first_frame + 2;
+  };
+  from_draft(
+      vectors, "segment-again",
+      "of two segments that begin with the same frame the later one counts",
+      faulty({"SEGM_OVERLAP"}), [again](Draft& d) { again(d, 0); }, four);
+  from_draft(
+      vectors, "segment-overlap-inside", "a segment that begins inside another one is dropped",
+      faulty({"SEGM_OVERLAP"}), [again](Draft& d) { again(d, 1); }, four);
+  add(vectors, "segment-again-lost",
+      "a segment that begins with the same frame, its planes lost: those of the earlier one stay",
+      lossy({"SEGM_OVERLAP", "FRAMING_PAYLOAD_CRC"}), [again, four] {
+        Draft draft = figure(four);
+        again(draft, 0);
+        Bytes bytes = assemble(draft);
+        bytes.at(offset_of(bytes, types::kChunk, 3) + kRecordHeaderBytes + 30) ^= 1;
+        return bytes;
+      });
   from_draft(
       vectors, "segment-gap", "a segment in the middle is missing", noted({"SEGM_GAP"}),
       [](Draft& d) { d.segments.erase(d.segments.begin() + 1), d.segments[1].record.index = 1; },

@@ -138,6 +138,11 @@ TEST_CASE("HEVC packets keep their slices, after their lengths, and nothing else
   CHECK(!stored_packet("hevc", join({kLong, {0x26}})));
 }
 
+TEST_CASE("an empty packet is stored for no codec") {
+  for (const char* codec : {"h264", "hevc", "av1", "vp9", "mpeg4", "ffv1"})
+    CHECK(!stored_packet(codec, {}));
+}
+
 TEST_CASE("AV1 packets lose their delimiters and gain sizes") {
   const Bytes delimiter = {0x12, 0x00}, frame = {0x32, 0x02, 0xab, 0xcd};
   const auto stored = stored_packet("av1", join({delimiter, frame, {0x36, 0x08, 0x05, 0x02}}));

@@ -50,6 +50,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const bool mend = (input.u8() & 1) != 0;
   Bytes bytes = copy(input.rest());
   if (mend && decoders::image_media_type(bytes) == "image/png") mend_png(bytes);
+  check(decoders::image_size(bytes));
   if (is_large(bytes)) return 0;
   const auto image = decoders::decode_image(bytes, "");
   if (!check(image)) return 0;

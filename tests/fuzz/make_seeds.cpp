@@ -1,19 +1,25 @@
 // SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <array>
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <initializer_list>
 #include <iterator>
+#include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "container/reader.hpp"
 #include "container/record_codec.hpp"
 #include "tests/bake_minimal/coding_clip.hpp"
 #include "tests/bake_minimal/gltf_builder.hpp"
 #include "tests/container/sample.hpp"
 #include "tests/decoders/image_samples.hpp"
 #include "tests/decoders/mesh_fixture.hpp"
+#include "tests/fuzz/encoder_form.hpp"
 #include "tests/fuzz/file_parts.hpp"
 #include "tests/player/coded_file.hpp"
 
@@ -25,6 +31,7 @@ using namespace relit;
 using namespace relit::container;
 using fuzz::Bytes;
 using Numbers = std::initializer_list<std::uint8_t>;
+using Values = std::initializer_list<std::uint16_t>;
 namespace fs = std::filesystem;
 
 class Seeds {
@@ -79,9 +86,10 @@ void add_records(Seeds& seeds, const Bytes& file, const std::string& name) {
 
 /// A whole file for each way in which the fuzzers of files may take it.
 void add_file(Seeds& seeds, const Bytes& file, const std::string& name) {
+  for (const std::uint8_t how : Numbers{0, 17, 34, 56})
+    seeds.add("container_fuzz", name + "_" + std::to_string(how), with_prefix({how}, file));
   for (const std::uint8_t how : Numbers{0, 1, 2, 8}) {
     const std::string variant = name + "_" + std::to_string(how);
-    seeds.add("container_fuzz", variant, with_prefix({how}, file));
     seeds.add("play_fuzz", variant, with_prefix({how}, file));
     seeds.add("alloc_fuzz", variant,
               with_prefix({static_cast<std::uint8_t>(how * 16 + how % 4), 40, 0}, file));
@@ -89,7 +97,33 @@ void add_file(Seeds& seeds, const Bytes& file, const std::string& name) {
   seeds.add("play_fuzz", name + "_ticks", with_prefix({4}, file));
   seeds.add("validate_fuzz", name, with_prefix({0}, file));
   seeds.add("validate_fuzz", name + "_deep", with_prefix({1}, file));
+  seeds.add("validate_fuzz", name + "_recover", with_prefix({2}, file));
+  // Of all the others the decoders see nothing new.
+  const bool coded = name.starts_with("coding") || name.starts_with("exponents") ||
+                     name.starts_with("rig") || name.starts_with("small");
+  for (const std::uint8_t how : Numbers{0, 0x80})
+    if (coded) seeds.add("decode_fuzz", name + "_" + std::to_string(how), with_prefix({how}, file));
   add_records(seeds, file, name);
+}
+
+/// One file with each edit that decode_fuzz knows, and values around the limits of most of them.
+void add_edits(Seeds& seeds, const Bytes& file, const std::string& name) {
+  constexpr std::uint8_t kStatic = 60, kChunk = 200, kChunkEnd = 207;
+  const auto add = [&](std::uint8_t which) {
+    for (const std::uint16_t value : Values{0, 1, 3, 5, 6, 270, 40000, 65535}) {
+      const auto low = static_cast<std::uint8_t>(value & 255);
+      const auto high = static_cast<std::uint8_t>(value >> 8);
+      for (const std::uint8_t how : Numbers{1, 0x81}) {
+        if (how != 1 && which < kChunk) continue;
+        seeds.add("decode_fuzz",
+                  name + "_edit" + std::to_string(how) + "_" + std::to_string(which) + "_" +
+                      std::to_string(value),
+                  with_prefix({how, which, low, high}, file));
+      }
+    }
+  };
+  for (std::uint8_t which = 0; which < kStatic; ++which) add(which);
+  for (std::uint8_t which = kChunk; which < kChunkEnd; ++which) add(which);
 }
 
 Bytes unpacked(const Bytes& frame) {
@@ -168,18 +202,57 @@ void add_images(Seeds& seeds) {
               with_prefix({0}, test::make_flat_jpeg(components)));
 }
 
-/// codec, size, flags, codec_private, packets: what video_fuzz takes.
+/// By the numbers that video_fuzz gives them.
+constexpr std::array<const char*, 6> kCodecs{"h264", "hevc", "mpeg4", "ffv1", "vp9", "av1"};
+
+/// codec, size, flags, codec_private, packets: what video_fuzz takes. `encoders`: in their form.
 Bytes video_seed(std::uint8_t codec, const LayerRecord& layer, const ChunkRecord& chunk,
-                 bool exponents) {
+                 bool exponents, bool encoders = false) {
+  const std::string_view name = kCodecs[codec % kCodecs.size()];
   const auto flags = static_cast<std::uint8_t>(
-      exponents ? 8u : static_cast<unsigned>(layer.chroma) | (layer.bit_depth > 8 ? 4u : 0u) | 8u);
+      (exponents ? 8u
+                 : static_cast<unsigned>(layer.chroma) | (layer.bit_depth > 8 ? 4u : 0u) | 8u) |
+      (encoders ? 16u : 0u) | (codec >= kCodecs.size() ? 32u : 0u));
   const auto side = [](std::uint16_t v) { return static_cast<std::uint8_t>(v - 1); };
   Bytes out{codec, side(exponents ? layer.exponent_width : layer.coded_width),
             side(exponents ? layer.exponent_height : layer.coded_height), flags};
-  append_piece(out, exponents ? layer.exponent_private : layer.codec_private);
-  for (const Packet& packet : chunk.packets)
-    append_piece(out, fuzz::copy(fuzz::Input(chunk.data).subspan(packet.offset, packet.size)));
+  const Bytes& codec_private = exponents ? layer.exponent_private : layer.codec_private;
+  append_piece(out, encoders ? fuzz::encoder_private(name, codec_private) : codec_private);
+  for (const Packet& packet : chunk.packets) {
+    const auto bytes = fuzz::Input(chunk.data).subspan(packet.offset, packet.size);
+    append_piece(out, encoders ? fuzz::encoder_packet(name, bytes) : fuzz::copy(bytes));
+  }
   return out;
+}
+
+/// The first chunk of each mantissa track, as stored, as encoders give it, and for decoders by
+/// name: one of the codec, one of another.
+void add_streams(Seeds& seeds, const Bytes& file, const std::string& name) {
+  auto reader = Reader::open(std::make_unique<MemorySource>(file));
+  if (!reader) return;
+  const auto contents = load_static(*reader);
+  if (!contents) return;
+  auto layers = contents->layers;
+  while (const auto record = reader->next()) {
+    if (!*record) return;
+    const auto* chunk = std::get_if<ChunkRecord>(&(*record)->body);
+    const auto layer = std::ranges::find_if(layers, [&](const LayerRecord& l) {
+      return chunk != nullptr && chunk->track_id == l.mantissa_track;
+    });
+    if (layer == layers.end()) continue;
+    const auto codec = std::ranges::find(kCodecs, layer->codec);
+    if (codec == kCodecs.end() || layer->coded_width > 128 || layer->coded_height > 128) continue;
+    const auto number = static_cast<std::uint8_t>(codec - kCodecs.begin());
+    const std::string track = name + "_" + std::to_string(layer->mantissa_track);
+    seeds.add("video_fuzz", track, video_seed(number, *layer, *chunk, false));
+    seeds.add("video_fuzz", track + "_encoders", video_seed(number, *layer, *chunk, false, true));
+    for (const unsigned decoder : {unsigned{number}, number + 1u}) {
+      const auto both = static_cast<std::uint8_t>(number + kCodecs.size() * (decoder % 6 + 6));
+      seeds.add("video_fuzz", track + "_by_name" + std::to_string(decoder),
+                video_seed(both, *layer, *chunk, false));
+    }
+    layers.erase(layer);
+  }
 }
 
 /// A file of the encoded planes, with meshes and poses of the small sample.
@@ -243,6 +316,7 @@ bool add_video(Seeds& seeds, std::uint8_t number, const VideoCase& video) {
   const Bytes file = coded_file(*encoded, kFrames);
   if (file.empty()) return false;
   add_file(seeds, file, name);
+  add_streams(seeds, file, name);
   return true;
 }
 
@@ -370,12 +444,22 @@ void add_models(Seeds& seeds) {
   seeds.add("gltf_fuzz", "full.gltf", text(full.gltf()));
 }
 
+void add_vector(Seeds& seeds, const Bytes& file, const std::string& name) {
+  add_file(seeds, file, name);
+  if (name.starts_with("coding") || name.starts_with("packets-b")) add_streams(seeds, file, name);
+  if (name == "rig-morph") add_edits(seeds, file, name);
+}
+
 void add_files(Seeds& seeds) {
   add_file(seeds, sample::file(), "sample");
-  for (const bool exponents : {false, true})
-    for (const char* codec : {"ffv1", "mpeg4"})
-      add_file(seeds, player::test::coded_file({codec, exponents, exponents, !exponents}),
-               std::string("small_") + codec + (exponents ? "_exponents" : ""));
+  for (const bool exponents : {false, true}) {
+    for (const char* codec : {"ffv1", "mpeg4"}) {
+      const Bytes file = player::test::coded_file({codec, exponents, exponents, !exponents});
+      const std::string name = std::string("small_") + codec + (exponents ? "_exponents" : "");
+      add_file(seeds, file, name);
+      if (exponents && codec == std::string_view("ffv1")) add_edits(seeds, file, name);
+    }
+  }
 }
 
 }  // namespace
@@ -398,7 +482,7 @@ int main(int argc, char** argv) {
   if (argc == 3 && fs::is_directory(argv[2])) {
     for (const auto& entry : fs::recursive_directory_iterator(argv[2]))
       if (entry.path().extension() == ".relit" && entry.file_size() <= kMostVectorBytes)
-        add_file(seeds, read(entry.path()), entry.path().stem().string());
+        add_vector(seeds, read(entry.path()), entry.path().stem().string());
   }
   std::printf("%d seeds\n", seeds.count());
   return seeds.failed() || !coded ? 1 : 0;

@@ -6,13 +6,16 @@ extern "C" {
 #include <array>
 #include <cstdint>
 #include <string>
+#include <utility>
 
+#include "decoders/codec_private.hpp"
 #include "decoders/video_decoder.hpp"
 #include "tests/fuzz/fuzz.hpp"
 
-/// Hostile video streams: codec, width, height, flags (chroma, bit depth, checksums made right),
-/// codec_private and packets behind their lengths. A picture that comes out has the size and depth
-/// that were promised, and all its samples can be read.
+/// Hostile video streams: codec, width, height, flags (chroma, bit depth, checksums made right, as
+/// encoders give them, a decoder by name), codec_private and packets behind their lengths. What an
+/// encoder, or a Matroska file, gives is brought into the stored form first. A picture that comes
+/// out has the size and depth that were promised, and all its samples can be read.
 namespace {
 
 using namespace relit;
@@ -72,31 +75,68 @@ void receive_all(VideoDecoder& decoder, const decoders::VideoFormat& format) {
   }
 }
 
-decoders::VideoFormat read_format(Cursor& input, bool& mend) {
+/// What the reader asks of packets before it decodes them holds for all that are made here.
+Bytes stored(const std::string& codec, Input packet) {
+  const auto bytes = decoders::stored_packet(codec, packet);
+  if (!check(bytes)) return {};
+  require(decoders::check_packet(codec, *bytes).has_value());
+  return *bytes;
+}
+
+/// How many pictures the stream says that it needs, and what one takes.
+void check_needs(const decoders::VideoFormat& format) {
+  const auto pictures = decoders::decoder_pictures(format.codec, format.codec_private);
+  if (check(pictures)) require(*pictures >= 1 && *pictures <= 17);
+  const auto bytes = decoders::picture_buffer_bytes(format);
+  if (!check(bytes)) return;
+  require(*bytes >=
+          decoders::picture_bytes(format.width, format.height, format.chroma, format.bit_depth));
+}
+
+struct Stream {
   decoders::VideoFormat format;
-  format.codec = kCodecs[input.u8() % kCodecs.size()];
+  decoders::VideoDecoderOptions options;
+  bool mend = false;
+  bool encoders = false;  ///< in the form in which encoders give streams
+};
+
+Stream read_stream(Cursor& input) {
+  Stream stream;
+  decoders::VideoFormat& format = stream.format;
+  const std::size_t codec = input.u8();
+  format.codec = kCodecs[codec % kCodecs.size()];
   format.width = 1 + input.u8() % 128;
   format.height = 1 + input.u8() % 128;
   const unsigned flags = input.u8();
   format.chroma = static_cast<container::Chroma>((flags & 3) % 3);
   format.bit_depth = (flags & 4) != 0 ? 10 : 8;
-  mend = (flags & 8) != 0 && format.codec == "ffv1";
+  stream.mend = (flags & 8) != 0 && format.codec == "ffv1";
+  stream.encoders = (flags & 16) != 0;
+  if ((flags & 32) != 0) stream.options.name = kCodecs[codec / kCodecs.size() % kCodecs.size()];
   format.codec_private = copy(input.piece());
-  if (mend) put_crc(format.codec_private);
-  return format;
+  if (stream.mend) put_crc(format.codec_private);
+  return stream;
 }
 
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   Cursor input({data, size});
-  bool mend = false;
-  const decoders::VideoFormat format = read_format(input, mend);
-  auto decoder = VideoDecoder::open(format);
+  Stream stream = read_stream(input);
+  decoders::VideoFormat& format = stream.format;
+  if (stream.encoders) {
+    auto codec_private = decoders::stored_private(format.codec, format.codec_private);
+    if (!check(codec_private)) return 0;
+    require(decoders::check_private(format.codec, *codec_private).has_value());
+    format.codec_private = std::move(*codec_private);
+  }
+  check_needs(format);
+  auto decoder = VideoDecoder::open(format, stream.options);
   if (!check(decoder)) return 0;
   for (int pts = 0; pts < kMostPackets && !input.empty(); ++pts) {
     Bytes packet = copy(input.piece());
-    if (mend) mend_ffv1(packet);
+    if (stream.mend) mend_ffv1(packet);
+    if (stream.encoders) packet = stored(format.codec, packet);
     if (!check(decoder->send(packet, pts, pts == 0)) && pts % 4 == 3) check(decoder->reopen());
     receive_all(*decoder, format);
   }

@@ -116,6 +116,41 @@ TEST_CASE("a lit quad is albedo times light times exposure, in sRGB", "[gles][es
   });
 }
 
+TEST_CASE("images are loaded once each, in order, and only where they are shown", "[gles]") {
+  const std::vector<std::uint8_t> red{255, 0, 0, 255}, green{0, 255, 0, 255};
+  const Quad quad;
+  on_each_backend([&](const Device& device, const Backend&) {
+    Stage stage(device);
+    std::vector<std::size_t> loaded;
+    const auto load = [&](std::size_t index) -> std::optional<ImageView> {
+      loaded.push_back(index);
+      if (index == 3) return std::nullopt;
+      return ImageView{1, 1, index == 0 ? red : green};
+    };
+    std::vector<MaterialView> materials(5);
+    materials[0].image = 2;
+    materials[1].image = 3;  // cannot be had
+    materials[2].image = 0;
+    materials[3].image = 2;
+    materials[3].wrap_u = Wrap::kMirror;  // another texture of the same image
+    require(stage.renderer->set_materials(4, load, materials));
+    CHECK(loaded == std::vector<std::size_t>{0, 2, 3});
+    // Full light on unit albedo: a channel is all or nothing.
+    const auto seen = [&](std::uint32_t material) {
+      const MeshView mesh = quad.view(material);
+      require(stage.renderer->set_meshes(std::span(&mesh, 1)));
+      require(stage.renderer->update_positions(0, quad.positions));
+      const auto pixel = stage.draw().at(kSide / 2, kSide / 2);
+      return std::array<bool, 3>{pixel[0] > 128, pixel[1] > 128, pixel[2] > 128};
+    };
+    CHECK(seen(0) == std::array{false, true, false});
+    CHECK(seen(1) == std::array{true, true, true});
+    CHECK(seen(2) == std::array{true, false, false});
+    CHECK(seen(3) == std::array{false, true, false});
+    CHECK(seen(4) == std::array{true, true, true});
+  });
+}
+
 TEST_CASE("the light map's row 0 is v = 0 and negative light is black", "[gles][es2]") {
   // Four texels: red above green on the left, blue above negative on the right.
   std::vector<float> light(3 * 4, 0.0f);
@@ -472,7 +507,7 @@ TEST_CASE("the renderer refuses meshes, materials and views that make no sense",
     CHECK_FALSE(stage.renderer->set_materials({}, std::span(&material, 1)));
     const std::vector<std::uint8_t> texels(15);
     const ImageView image{2, 2, texels};
-    CHECK_FALSE(stage.renderer->set_materials(std::span(&image, 1), {}));
+    CHECK_FALSE(stage.renderer->set_materials(std::span(&image, 1), std::span(&material, 1)));
 
     mesh = quad.view(7);
     REQUIRE(stage.renderer->set_meshes(std::span(&mesh, 1)));

@@ -216,6 +216,34 @@ TEST_CASE("standard input plays forward") {
   CHECK(std::filesystem::exists(folder.file("x.png")));
 }
 
+TEST_CASE("stream keeps to a memory budget, or is refused with the one that would do") {
+  const Folder folder;
+  const std::string clip = shipped_clip().string();
+  const std::string composite = " --sink composite --light " + shipped_light().string();
+  std::string says;
+  REQUIRE(run_relit("stream " + clip + composite + " --memory-budget 12MiB --fill --json", &says) ==
+          0);
+  const auto played = nlohmann::json::parse(says);
+  CHECK(played["frames"] == 120);
+  const auto& plan = played["plan"];
+  CHECK(plan["heap_bytes"].get<std::uint64_t>() <= (12u << 20));
+  CHECK(plan["given_up"].size() > 0);
+  CHECK(played["peak_bytes"]["ring"].get<std::uint64_t>() <= plan["heap_bytes"]);
+  // What `relit plan` says of the same.
+  REQUIRE(run_relit("plan " + clip + " --headless --memory-budget 12MiB --json", &says) == 0);
+  const auto planned = nlohmann::json::parse(says);
+  CHECK(planned["heap_bytes"] == plan["heap_bytes"]);
+  CHECK(planned["ring"]["frames"] == plan["ring_frames"]);
+
+  CHECK(run_relit("stream " + clip + composite + " --memory-budget 1MiB", &says) == 1);
+  CHECK(says.find("needs at least") != std::string::npos);
+  CHECK(run_relit("stream " + clip + " --memory-budget 12MiB --ring 8MiB") == 2);
+  CHECK(run_relit("stream " + clip + " --memory-budget much") == 2);
+  CHECK(run_relit("stream " + clip + " --fill") == 2);
+  // A pipe's segments are not known beforehand, and are taken to be large.
+  CHECK(run_relit("stream - --memory-budget 32MiB <" + clip) == 0);
+}
+
 TEST_CASE("without a display play points to render") {
   std::string says;
   const int status = run_relit("play " + clip_and_light(), &says);

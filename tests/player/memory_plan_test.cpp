@@ -289,3 +289,54 @@ TEST_CASE("numbers of bytes are read with their units") {
     CHECK(read.error().code == ErrorCode::kInvalid);
   }
 }
+
+TEST_CASE("a memory plan of a sequence counts the two clips that take most") {
+  FileContents file = contents();
+  // A second clip, whose light map and pictures are twice as wide, and a third one like the first.
+  file.clips.push_back(file.clips[0]);
+  file.clips[1].id = 1, file.clips[1].name = "run";
+  file.models.push_back(file.models[0]);
+  file.models[1].id = file.models[1].clip_id = 1;
+  file.models[1].width = 2 * kSide;
+  file.pose_tracks.push_back(file.pose_tracks[0]);
+  file.pose_tracks[1].clip_id = 1;
+  for (std::size_t l = 0; l < 3; ++l) {
+    LayerRecord layer = file.layers[l];
+    layer.model_id = 1;
+    layer.coded_width = static_cast<std::uint16_t>(2 * layer.coded_width);
+    for (container::PlaneRecord& plane : layer.planes) {
+      plane.mantissa_rect.x = static_cast<std::uint16_t>(2 * plane.mantissa_rect.x);
+      plane.mantissa_rect.width = 2 * kSide;
+    }
+    file.layers.push_back(layer);
+  }
+  MemoryWishes walk = drawn(), run = drawn(), both = drawn(), thrice = drawn();
+  walk.clip = both.clip = thrice.clip = "walk";
+  run.clip = "run";
+  both.others = {"run"};
+  thrice.others = {"walk", "run", "walk"};
+  const auto bytes = [&](const MemoryWishes& wishes) { return plan(file, wishes).total_bytes(); };
+  const MemoryPlan p = plan(file, both);
+  CHECK(term(p, "second clip").heap_bytes > 0);
+  CHECK(term(p, "cross-fade").heap_bytes == 3 * sizeof(float) * 2 * kSide * kSide);
+  // Each alone counts what they share: program, records, meshes.
+  CHECK(bytes(both) < bytes(walk) + bytes(run));
+  CHECK(bytes(both) > bytes(run) + term(plan(file, walk), "ring").heap_bytes);
+  CHECK(bytes(thrice) == bytes(both));  // more are never in memory
+  // One that comes after itself is there twice.
+  MemoryWishes again = walk;
+  again.others = {"walk"};
+  CHECK(bytes(again) > bytes(walk));
+  CHECK(bytes(again) < bytes(both));
+  // The ring is that of the larger pictures, whichever clip it is.
+  CHECK(p.frame_bytes == plan(file, run).frame_bytes);
+  CHECK(plan(file, both, bytes(both) - 1).total_bytes() < bytes(both));
+  const auto least_of_both = smallest_budget(file, kSegments, both);
+  REQUIRE(least_of_both);
+  CHECK(*least_of_both > least(file, run));
+  CHECK(plan_memory(file, kSegments, both, *least_of_both));
+  CHECK(plan_memory(file, kSegments, both, *least_of_both - 1).error().code ==
+        ErrorCode::kOutOfMemory);
+  both.others = {"swim"};
+  CHECK(plan_memory(file, kSegments, both, {}).error().code == ErrorCode::kNotFound);
+}

@@ -347,3 +347,68 @@ TEST_CASE("a decoder by name that is not there falls back to software and says s
     CHECK(notes.front().find(name) != std::string::npos);
   }
 }
+
+TEST_CASE("segments that are decoded side by side give the frames that a ClipReader decodes") {
+  for (const auto& file : {read_bytes(shipped_clip()), damaged_clip()}) {
+    const auto expected = all_frames(file);
+    auto options = patient();
+    options.ring_bytes = std::size_t{128} << 20;  // more than three segments
+    options.loop = true;
+    auto prefetcher = prefetch(memory_source(file), options, 3);
+    for (const auto& track : prefetcher->stats().tracks)
+      CHECK(track.decoders == (track.layer < 0 ? 1 : 3));
+    for (int lap = 0; lap < 2; ++lap) {
+      for (std::uint64_t k = 0; k < expected.size(); ++k) {
+        INFO("lap " << lap << ", frame " << k);
+        REQUIRE(fetched(*prefetcher, k) == expected[k]);
+      }
+    }
+    CHECK(prefetcher->stats().restarts == 0);
+    std::mt19937 random(11);
+    for (int i = 0; i < 20; ++i) {
+      const auto k = random() % (expected.size() - 1);
+      INFO("seek " << i << " to frame " << k);
+      REQUIRE(fetched(*prefetcher, k) == expected[k]);
+      REQUIRE(fetched(*prefetcher, k + 1) == expected[k + 1]);
+    }
+  }
+}
+
+TEST_CASE("where the ring does not reach over segments a track has one decoder") {
+  auto options = patient();
+  options.ring_bytes = std::size_t{4} << 20;  // four frames of the shipped clip
+  auto prefetcher = prefetch(memory_source(read_bytes(shipped_clip())), options, 3);
+  for (const auto& track : prefetcher->stats().tracks) CHECK(track.decoders == 1);
+  // Nor where its threads are given, as a memory plan gives them.
+  options.ring_bytes = std::size_t{128} << 20;
+  options.threads = 1;
+  prefetcher = prefetch(memory_source(read_bytes(shipped_clip())), options, 3);
+  for (const auto& track : prefetcher->stats().tracks) CHECK(track.decoders == 1);
+}
+
+TEST_CASE("until playback moves on from its first picture no more is decoded") {
+  auto prefetcher = prefetch(memory_source(read_bytes(shipped_clip())), patient());
+  const auto settled = [&] {
+    auto before = prefetcher->stats().decoded_frames;
+    for (int still = 0; still < 20;) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+      const auto now = prefetcher->stats().decoded_frames;
+      still = now == before ? still + 1 : 0;
+      before = now;
+    }
+    return before;
+  };
+  REQUIRE(prefetcher->wait(0, kPatience_s));
+  CHECK(settled() <= 2);
+  REQUIRE(prefetcher->frame(0) != nullptr);
+  CHECK(settled() <= 2);
+  prefetcher->want(1);
+  // Then the ring fills by itself.
+  for (int i = 0; i < 6000 && prefetcher->stats().decoded_frames < 8; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  CHECK(prefetcher->stats().decoded_frames >= 8);
+  prefetcher->want(60);
+  REQUIRE(prefetcher->wait(60, kPatience_s));
+  const auto after = prefetcher->stats().decoded_frames;
+  CHECK(settled() - after <= 1);
+}
