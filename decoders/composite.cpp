@@ -41,55 +41,60 @@ std::string size_text(int width, int height) {
   return std::to_string(width) + "x" + std::to_string(height);
 }
 
+// Names are made only for errors: jobs are checked every frame.
+std::string plane_name(std::size_t plane) { return "plane " + std::to_string(plane); }
+
 /// Whether `view` has a sample for every texel of the light map, 2^shift texels to a sample.
-Status check_view(const SampleView& view, int shift, const CompositeJob& job,
-                  const std::string& what) {
+Status check_view(const SampleView& view, int shift, const CompositeJob& job, std::size_t plane,
+                  const char* samples) {
+  const auto what = [&] { return plane_name(plane) + ": " + samples; };
   const int width = (job.width + (1 << shift) - 1) >> shift;
   const int height = (job.height + (1 << shift) - 1) >> shift;
   if (view.width < width || view.height < height) {
-    return fail(ErrorCode::kInvalid, what + " are " + size_text(view.width, view.height) +
+    return fail(ErrorCode::kInvalid, what() + " are " + size_text(view.width, view.height) +
                                          "; the light map needs " + size_text(width, height));
   }
   const std::ptrdiff_t row_bytes = std::ptrdiff_t{view.width} * view.bytes_per_sample;
   if (view.height > 1 && std::abs(view.stride_bytes) < row_bytes) {
-    return fail(ErrorCode::kInvalid, what + " have rows of " + std::to_string(row_bytes) +
+    return fail(ErrorCode::kInvalid, what() + " have rows of " + std::to_string(row_bytes) +
                                          " bytes every " + std::to_string(view.stride_bytes));
   }
   return {};
 }
 
-Status check_plane(const PlaneView& plane, const CompositeJob& job, const std::string& name) {
+Status check_plane(const PlaneView& plane, const CompositeJob& job, std::size_t k) {
   if (plane.mantissa.empty()) {
-    return fail(ErrorCode::kInvalid, name + " has a weight but no mantissas");
+    return fail(ErrorCode::kInvalid, plane_name(k) + " has a weight but no mantissas");
   }
   if (plane.mantissa.bytes_per_sample != 1 && plane.mantissa.bytes_per_sample != 2) {
-    return fail(ErrorCode::kInvalid, name + ": mantissas take 1 or 2 bytes, not " +
+    return fail(ErrorCode::kInvalid, plane_name(k) + ": mantissas take 1 or 2 bytes, not " +
                                          std::to_string(plane.mantissa.bytes_per_sample));
   }
   if (plane.mantissa_shift != 0 && plane.mantissa_shift != 1) {
-    return fail(ErrorCode::kInvalid, name + ": mantissa shift must be 0 or 1, not " +
+    return fail(ErrorCode::kInvalid, plane_name(k) + ": mantissa shift must be 0 or 1, not " +
                                          std::to_string(plane.mantissa_shift));
   }
   if (plane.mantissa_zero < 0 || plane.mantissa_zero > 65535) {
-    return fail(ErrorCode::kInvalid, name + ": mantissa zero must be 0 to 65535, not " +
+    return fail(ErrorCode::kInvalid, plane_name(k) + ": mantissa zero must be 0 to 65535, not " +
                                          std::to_string(plane.mantissa_zero));
   }
-  if (!std::isfinite(plane.scale)) return fail(ErrorCode::kInvalid, name + ": scale is not finite");
-  RELIT_TRY(check_view(plane.mantissa, plane.mantissa_shift, job, name + ": mantissas"));
+  if (!std::isfinite(plane.scale))
+    return fail(ErrorCode::kInvalid, plane_name(k) + ": scale is not finite");
+  RELIT_TRY(check_view(plane.mantissa, plane.mantissa_shift, job, k, "mantissas"));
   if (plane.exponent.empty()) return {};
   if (plane.exponent.bytes_per_sample != 1) {
-    return fail(ErrorCode::kInvalid, name + ": exponents take 1 byte, not " +
+    return fail(ErrorCode::kInvalid, plane_name(k) + ": exponents take 1 byte, not " +
                                          std::to_string(plane.exponent.bytes_per_sample));
   }
   if (plane.exponent_shift < 0 || plane.exponent_shift > 5) {
-    return fail(ErrorCode::kInvalid, name + ": exponent shift must be 0 to 5, not " +
+    return fail(ErrorCode::kInvalid, plane_name(k) + ": exponent shift must be 0 to 5, not " +
                                          std::to_string(plane.exponent_shift));
   }
   if (plane.exponent_zero < 128 || plane.exponent_zero > 150) {
-    return fail(ErrorCode::kInvalid, name + ": exponent zero must be 128 to 150, not " +
+    return fail(ErrorCode::kInvalid, plane_name(k) + ": exponent zero must be 128 to 150, not " +
                                          std::to_string(plane.exponent_zero));
   }
-  return check_view(plane.exponent, plane.exponent_shift, job, name + ": exponents");
+  return check_view(plane.exponent, plane.exponent_shift, job, k, "exponents");
 }
 
 Status check_light(const CompositeJob& job) {
@@ -145,11 +150,10 @@ Status CompositeJob::validate() const {
   }
   for (std::size_t k = 0; k < planes.size(); ++k) {
     if (is_zero(light.weights[k]) && static_cast<int>(k) != light.prediction_plane) continue;
-    const std::string name = "plane " + std::to_string(k);
-    RELIT_TRY(check_plane(planes[k], *this, name));
+    RELIT_TRY(check_plane(planes[k], *this, k));
     for (float weight : light.weights[k]) {
       if (!std::isfinite(weight * planes[k].scale)) {
-        return fail(ErrorCode::kInvalid, name + ": weight times scale is not finite");
+        return fail(ErrorCode::kInvalid, plane_name(k) + ": weight times scale is not finite");
       }
     }
   }

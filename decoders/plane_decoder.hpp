@@ -85,6 +85,13 @@ class TrackDecoder {
   /// decodable.
   Result<const VideoFrame*> picture(std::uint64_t frame);
 
+  /// From now on frames are asked for that `n` divides, so that pictures which none of them shows
+  /// are decoded only where others refer to them. Any other frame may be asked for all the same,
+  /// and costs the segment from its beginning. At first 1.
+  void show_every(std::uint64_t n);
+  /// Pictures that the codec has given so far.
+  [[nodiscard]] std::uint64_t pictures() const { return pictures_; }
+
   /// Keeps this chunk alone; `chunk` gets the storage of one that was kept before. So chunk after
   /// chunk is taken without an allocation. Errors: as add_chunk(); no chunk is here then.
   Status replace_chunk(const container::SegmentRecord& segment, container::ChunkRecord& chunk);
@@ -113,6 +120,8 @@ class TrackDecoder {
   /// Makes `ahead_` the next picture of the chunk; leaves it empty at the end.
   void advance(const Chunk& chunk);
   void feed(const Chunk& chunk);
+  [[nodiscard]] bool is_shown(const Chunk& chunk, std::int64_t pts) const;
+  void pass_unshown(const Chunk& chunk);
   void note_damage(const Chunk& chunk, Error error);
 
   VideoDecoder decoder_;
@@ -125,6 +134,9 @@ class TrackDecoder {
   bool skipping_ = false;  ///< after damage, until a key packet
   std::optional<Error> damage_;
   std::vector<std::int64_t> suspects_;  ///< pts of the packets that damage may have hit
+  std::uint64_t every_ = 1;
+  std::int64_t asked_ = -1;  ///< pts of the picture that is being decoded
+  std::uint64_t pictures_ = 0;
   VideoFrame current_;
   VideoFrame ahead_;
 };

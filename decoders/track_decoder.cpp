@@ -123,11 +123,42 @@ void TrackDecoder::note_damage(const Chunk& chunk, Error error) {
   if (!damage_) damage_ = std::move(error);
 }
 
+void TrackDecoder::show_every(std::uint64_t n) {
+  // What has been left out may be asked for now.
+  if (n % every_ != 0) segment_.reset();
+  every_ = n;
+}
+
+// A picture is shown until the next one is.
+bool TrackDecoder::is_shown(const Chunk& chunk, std::int64_t pts) const {
+  if (every_ == 1 || pts == asked_) return true;
+  const auto next = std::upper_bound(chunk.shown.begin(), chunk.shown.end(), pts);
+  const std::uint64_t end =
+      next != chunk.shown.end() ? static_cast<std::uint64_t>(*next) : chunk.end_frame;
+  return (static_cast<std::uint64_t>(pts) + every_ - 1) / every_ * every_ < end;
+}
+
+// Packets are not even sent where no picture is shown before the next key packet, or to the end. A
+// key packet in mid-chunk is trusted to begin anew only where no picture after it comes before it
+// in time: such a one may refer to what was passed over.
+void TrackDecoder::pass_unshown(const Chunk& chunk) {
+  const auto& packets = chunk.record.packets;
+  const auto begin = packets.begin() + static_cast<std::ptrdiff_t>(next_packet_);
+  for (auto at = begin; at != packets.end(); ++at) {
+    const auto precedes = [&](const container::Packet& packet) { return packet.pts < at->pts; };
+    if (at != begin && at->key && std::none_of(at, packets.end(), precedes))
+      next_packet_ = static_cast<std::size_t>(at - packets.begin());
+    if (is_shown(chunk, at->pts)) return;
+  }
+  next_packet_ = packets.size();
+}
+
 void TrackDecoder::feed(const Chunk& chunk) {
   const auto& packets = chunk.record.packets;
   // Damage ends what the codec can be trusted with: packets up to the next key packet are left out,
   // and the pictures that they would have shown are reported as lost.
   while (next_packet_ < packets.size() && skipping_ && !packets[next_packet_].key) ++next_packet_;
+  if (every_ > 1) pass_unshown(chunk);
   if (next_packet_ == packets.size()) {
     if (Status drained = decoder_.drain(); !drained) note_damage(chunk, std::move(drained).error());
     drained_ = true;
@@ -144,7 +175,8 @@ void TrackDecoder::feed(const Chunk& chunk) {
   const auto bytes =
       std::span(chunk.record.data)
           .subspan(static_cast<std::size_t>(packet.offset), static_cast<std::size_t>(packet.size));
-  if (Status sent = decoder_.send(bytes, packet.pts, packet.key); !sent) {
+  if (Status sent = decoder_.send(bytes, packet.pts, packet.key, is_shown(chunk, packet.pts));
+      !sent) {
     note_damage(chunk, std::move(sent).error());
   }
 }
@@ -161,6 +193,7 @@ void TrackDecoder::advance(const Chunk& chunk) {
       continue;
     }
     if (*received == VideoDecoder::Received::kFrame) {
+      ++pictures_;
       const std::int64_t pts = ahead_.pts();
       const std::int64_t after = current_.empty() ? -1 : current_.pts();
       if (std::find(suspects_.begin(), suspects_.end(), pts) != suspects_.end()) {
@@ -208,11 +241,14 @@ Result<const VideoFrame*> TrackDecoder::picture(std::uint64_t frame) {
     return fail(ErrorCode::kCorrupt, where() + "no packet at or before it in its segment");
   }
   const std::int64_t expected = *std::prev(after);
+  asked_ = -1;
+  const bool foreseen = is_shown(chunk, expected);
+  asked_ = expected;
   if (segment_ != found->first || (!current_.empty() && current_.pts() > expected)) {
     restart(found->first);
   }
   if (decode_until(chunk, expected)) return &current_;
-  if (decoder_.fell_back()) {
+  if (decoder_.fell_back() || !foreseen) {
     restart(found->first);
     if (decode_until(chunk, expected)) return &current_;
   }

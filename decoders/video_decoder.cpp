@@ -317,7 +317,8 @@ bool VideoDecoder::fell_back() {
   return true;
 }
 
-Status VideoDecoder::send(std::span<const std::uint8_t> packet, std::int64_t pts, bool key) {
+Status VideoDecoder::send(std::span<const std::uint8_t> packet, std::int64_t pts, bool key,
+                          bool shown) {
   const auto where = [&] { return track_name(format_) + ", frame " + std::to_string(pts); };
   if (packet.size() > limits::kRecordBytes) {
     return fail(ErrorCode::kLimit, where() + ": a packet of " + std::to_string(packet.size()) +
@@ -339,6 +340,8 @@ Status VideoDecoder::send(std::span<const std::uint8_t> packet, std::int64_t pts
   packet_->dts = AV_NOPTS_VALUE;
   packet_->flags = key ? AV_PKT_FLAG_KEY : 0;
   // Without a buffer of its own the packet is copied, and gets its zero padding, inside.
+  // Whatever was sent before has been taken in: receive() has said kAgain.
+  context_->skip_frame = shown ? AVDISCARD_DEFAULT : AVDISCARD_NONREF;
   const int error = avcodec_send_packet(context_.get(), packet_.get());
   packet_->data = nullptr;
   packet_->size = 0;

@@ -84,10 +84,12 @@ class VideoDecoder {
   VideoDecoder& operator=(VideoDecoder&&) noexcept;
   ~VideoDecoder();
 
-  /// Hands over one packet (copied by libavcodec). Call receive() until kAgain first.
+  /// Hands over one packet (copied by libavcodec). Call receive() until kAgain first. Where
+  /// `shown` is false nobody asks for its picture, and the codec leaves it out if no other picture
+  /// refers to it.
   /// Errors: kCorrupt naming track and pts; the next packet to be sent is then a key packet,
   /// after reopen() where pictures inside do not matter.
-  Status send(std::span<const std::uint8_t> packet, std::int64_t pts, bool key);
+  Status send(std::span<const std::uint8_t> packet, std::int64_t pts, bool key, bool shown = true);
   /// No packets follow until flush(): receive() then yields what is still inside.
   Status drain();
 

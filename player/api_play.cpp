@@ -14,12 +14,6 @@ using namespace relit::player::api;  // NOLINT
 
 namespace {
 
-Result<LightField> steady(decoders::Light light) {
-  LightFieldParts parts;
-  parts.lights.push_back(std::move(light));
-  return LightField::create(std::move(parts));
-}
-
 Status need_finite(double value, const char* name) {
   if (std::isfinite(value)) return {};
   return invalid(std::string(name) + " is not finite");
@@ -59,7 +53,7 @@ relit_result relit_set_light_sh(relit_player* player, const float* rgb, uint32_t
     decoders::Light light;
     for (std::uint32_t n = 0; n < count; ++n)
       light.sh.push_back({double{rgb[3 * n]}, double{rgb[3 * n + 1]}, double{rgb[3 * n + 2]}});
-    RELIT_ASSIGN(LightField field, steady(std::move(light)));
+    RELIT_ASSIGN(LightField field, LightField::steady(std::move(light)));
     return p.set_light(std::move(field), nullptr, 0);
   });
 }
@@ -81,7 +75,7 @@ relit_result relit_set_environment(relit_player* player, const float* rgb, int32
     environment->rgb.assign(rgb, rgb + count);
     RELIT_ASSIGN(decoders::Light light,
                  decoders::project_environment(*environment, static_cast<int>(limits::kShOrder)));
-    RELIT_ASSIGN(LightField field, steady(std::move(light)));
+    RELIT_ASSIGN(LightField field, LightField::steady(std::move(light)));
     return p.set_light(std::move(field), std::move(environment), 0);
   });
 }
@@ -89,16 +83,9 @@ relit_result relit_set_environment(relit_player* player, const float* rgb, int32
 relit_result relit_set_light_file(relit_player* player, const char* path) noexcept {
   return call(player, [&](Player& p) -> Status {
     RELIT_TRY(need(path, "path"));
-    RELIT_ASSIGN(LoadedLight loaded, load_light(path));
+    RELIT_ASSIGN(const LoadedLight loaded, load_light(path));
     for (const std::string& warning : loaded.warnings) player->log.say(RELIT_LOG_WARNING, warning);
-    if (!loaded.field) {
-      RELIT_ASSIGN(loaded.field, steady(std::move(loaded.light)));
-    }
-    std::shared_ptr<const decoders::Environment> environment;
-    if (loaded.environment)
-      environment = std::make_shared<decoders::Environment>(std::move(*loaded.environment));
-    return p.set_light(std::move(*loaded.field), std::move(environment),
-                       loaded.environment_rotation_rad);
+    return p.set_light(loaded);
   });
 }
 

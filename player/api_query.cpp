@@ -120,6 +120,7 @@ relit_statistics statistics_of(const Player& player) {
   out.half_size = stats.chosen.half_size ? 1 : 0;
   out.light_map_every = stats.chosen.light_map_every;
   out.threads = player.plan().threads;
+  out.pose_bytes = stats.prefetch.pose_bytes;
   return out;
 }
 

@@ -77,7 +77,6 @@ Status Character::set_materials() {
 Status Character::set_meshes() {
   const std::vector<container::MaterialRecord>& materials = contents_.materials;
   std::vector<gles::MeshView> views;
-  std::size_t most = 0;
   for (const decoders::Mesh& mesh : meshes_) {
     gles::MeshView view;
     view.vertex_count = mesh.positions.size();
@@ -90,20 +89,8 @@ Status Character::set_meshes() {
                      [&](const container::MaterialRecord& m) { return m.id == mesh.material_id; });
     view.material = static_cast<std::uint32_t>(material - materials.begin());
     views.push_back(view);
-    most = std::max(most, mesh.positions.size());
   }
-  positions_.resize(most);
   return renderer_->set_meshes(views);
-}
-
-Status Character::pose(const decoders::Pose& pose) {
-  for (std::size_t m = 0; m < meshes_.size(); ++m) {
-    const decoders::Mesh& mesh = meshes_[m];
-    const std::span<glm::vec3> positions(positions_.data(), mesh.positions.size());
-    decoders::pose_mesh(mesh, m, pose, positions, {});
-    RELIT_TRY(renderer_->update_positions(m, positions));
-  }
-  return {};
 }
 
 }  // namespace relit::player

@@ -9,7 +9,6 @@
 #include "container/base/result.hpp"
 #include "container/reader.hpp"
 #include "decoders/mesh.hpp"
-#include "decoders/pose.hpp"
 #include "gles/character_renderer.hpp"
 
 namespace relit::player {
@@ -24,9 +23,6 @@ class Character {
                                                    std::span<const decoders::Mesh> meshes,
                                                    const gles::Device& device);
 
-  /// Poses the meshes. Steady state allocates nothing. Errors: kInvalid.
-  Status pose(const decoders::Pose& pose);
-
   [[nodiscard]] gles::CharacterRenderer& renderer() { return *renderer_; }
   [[nodiscard]] const std::vector<std::string>& warnings() const { return warnings_; }
 
@@ -39,7 +35,6 @@ class Character {
   const container::FileContents& contents_;
   std::span<const decoders::Mesh> meshes_;
   std::unique_ptr<gles::CharacterRenderer> renderer_;
-  std::vector<glm::vec3> positions_;
   std::vector<std::string> warnings_;
 };
 

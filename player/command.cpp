@@ -92,16 +92,16 @@ Result<LoadedLight> load_light(const LightArguments& arguments, int order) {
   return light;
 }
 
-void add_view_options(CLI::App& command, ViewOptions& view, std::string& camera) {
+void add_look_options(CLI::App& command, LookOptions& look, std::string& camera) {
   command.add_option("--camera", camera, "orbit:AZIMUTH,ELEVATION[,DISTANCE], degrees and metres");
-  command.add_option("--exposure", view.exposure, "auto, or stops: radiance × 2^stops")
+  command.add_option("--exposure", look.exposure, "auto, or stops: radiance × 2^stops")
       ->capture_default_str();
-  command.add_option("--tone-map", view.tone_map, "neutral, filmic or linear")
+  command.add_option("--tone-map", look.tone_map, "neutral, filmic or linear")
       ->capture_default_str();
-  command.add_option("--background", view.background, "light, sh, none (transparent) or #rrggbb")
+  command.add_option("--background", look.background, "light, sh, none (transparent) or #rrggbb")
       ->capture_default_str();
   command
-      .add_option("--background-blur", view.background_blur_deg,
+      .add_option("--background-blur", look.background_blur_deg,
                   "soft focus of the background, degrees")
       ->check(CLI::Range(0.0, 90.0));
 }

@@ -11,7 +11,7 @@
 #include "container/base/result.hpp"
 #include "player/clip_reader.hpp"
 #include "player/light.hpp"
-#include "player/scene_view.hpp"
+#include "player/look.hpp"
 #include "player/source.hpp"
 
 /// What the commands of `relit` share. Messages go to standard error, data and JSON to standard
@@ -57,7 +57,7 @@ void add_light_options(CLI::App& command, LightArguments& arguments);
 [[nodiscard]] Result<LoadedLight> load_light(const LightArguments& arguments, int order);
 
 /// --camera, --exposure, --tone-map, --background and --background-blur.
-void add_view_options(CLI::App& command, ViewOptions& view, std::string& camera);
+void add_look_options(CLI::App& command, LookOptions& look, std::string& camera);
 
 /// "7", "0-99": frames first..last of a clip of `count` frames.
 struct FrameRange {

@@ -36,9 +36,8 @@ Status read_player_options(const Arguments& arguments, WindowOptions& window) {
     RELIT_ASSIGN(player.memory_budget_bytes, parse_bytes(arguments.memory_budget));
   }
   player.interpolate = !arguments.no_interpolation;
-  player.layers = window.view.layers;
   player.drawing = DrawingScale{};
-  player.drawing->background_side = window.view.background == "light" ? 512 : 0;
+  player.drawing->background_side = window.look.background == "light" ? 512 : 0;
   if (arguments.loop) window.loop = LoopMode::kOn;
   if (arguments.no_loop) window.loop = LoopMode::kOff;
   return {};
@@ -57,7 +56,7 @@ Result<WindowOptions> window_options(const Arguments& arguments) {
     from = comma + 1;
   }
   if (!arguments.camera.empty()) {
-    RELIT_ASSIGN(window.view.camera, parse_camera(arguments.camera));
+    RELIT_ASSIGN(window.camera, parse_camera(arguments.camera));
   }
   if (!arguments.at.empty()) window.position = {arguments.at[0], arguments.at[1], arguments.at[2]};
   RELIT_TRY(read_player_options(arguments, window));
@@ -109,7 +108,7 @@ void add_cost_options(CLI::App& command, Arguments& a) {
   command
       .add_option("--composite", a.composite, "who adds the planes up: auto, cpu, texture or fused")
       ->capture_default_str();
-  command.add_option("--layers", a.window.view.layers,
+  command.add_option("--layers", a.window.player.layers,
                      "only the first so many layers: faster and less accurate");
   command.add_option("--threads", a.window.player.threads, "that decode; 0: one a processor")
       ->check(CLI::Range(0, 64))
@@ -135,7 +134,7 @@ Command add_play(CLI::App& app) {
           "X,Y,Z: where the character stands in a light that varies with the place, metres")
       ->delimiter(',')
       ->expected(3);
-  add_view_options(*command, a->window.view, a->camera);
+  add_look_options(*command, a->window.look, a->camera);
   add_playback_options(*command, *a);
   add_cost_options(*command, *a);
   command->add_option("--width", a->window.width, "of the window")

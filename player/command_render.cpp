@@ -6,8 +6,9 @@
 #include "gles/picture.hpp"
 #include "player/command.hpp"
 #include "player/gl_backend.hpp"
+#include "player/look.hpp"
 #include "player/picture_writer.hpp"
-#include "player/scene_view.hpp"
+#include "player/player.hpp"
 
 namespace relit::player {
 namespace {
@@ -17,10 +18,10 @@ struct Arguments {
   std::string output, clip, frame, frames, camera, sheet, backend = "egl", composite,
                                                           size = "512x512";
   LightArguments light;
-  ViewOptions view;
+  LookOptions look;
   std::vector<float> position{0, 0, 0};
   double time_s = -1;
-  int layers = -1, threads = 1, samples = 4;
+  int layers = -1, threads = 0, samples = 4;
   bool lightmap = false;
 };
 
@@ -44,8 +45,9 @@ Result<Size> parse_size(const std::string& text, const char* option, int largest
                                        std::to_string(largest) + " each");
 }
 
-Result<FrameRange> chosen_frames(const Arguments& arguments, ClipReader& reader) {
-  const container::ClipRecord& clip = reader.clip();
+// The frames that are asked for, as far as the clip's record says; by a time, and unevenly spaced,
+// it may be any.
+Result<FrameRange> chosen_frames(const Arguments& arguments, const container::ClipRecord& clip) {
   if (!arguments.frames.empty())
     return parse_frames(arguments.frames, "--frames", clip.frame_count);
   if (!arguments.frame.empty()) return parse_frames(arguments.frame, "--frame", clip.frame_count);
@@ -59,8 +61,9 @@ Result<FrameRange> chosen_frames(const Arguments& arguments, ClipReader& reader)
     }
     // A time that names a tick to within rounding means that tick.
     const auto tick = std::min(static_cast<std::uint64_t>(at + 1e-6), clip.duration_ticks - 1);
-    RELIT_ASSIGN(range.first, reader.frame_at(tick));
-    range.last = range.first;
+    const bool even = clip.duration_ticks == clip.frame_count;
+    range.first = even ? tick : 0;
+    range.last = even ? tick : clip.frame_count - 1;
     return range;
   }
   const std::string extension = std::filesystem::path(arguments.output).extension().string();
@@ -76,110 +79,135 @@ Result<CompositePath> chosen_path(const Arguments& arguments, Backend backend) {
   return backend == Backend::kCpu ? CompositePath::kCpu : CompositePath::kTexture;
 }
 
-// A light that varies, at the frames of a clip.
-class LightOfFrame {
+// A player of the frames that were asked for, under the light. Time moves by show() alone.
+class Frames {
  public:
-  LightOfFrame(const Arguments& arguments, const LoadedLight& light, const ClipReader& clip)
-      : light_(light),
-        clip_(clip),
-        position_(arguments.position[0], arguments.position[1], arguments.position[2]) {}
-
-  // Of a frame that the clip has given; null where the light does not vary.
-  const decoders::Light* at(std::uint64_t frame) {
-    if (!light_.field) return nullptr;
-    const container::Rational& rate = clip_.clip().tick_rate;
-    const double time_s = static_cast<double>(clip_.first_tick(frame)) *
-                          static_cast<double>(rate.den) / static_cast<double>(rate.num);
-    light_.field->sample(time_s, position_, now_);
-    return &now_;
+  static Result<Frames> open(const Arguments& arguments) {
+    Frames frames;
+    RELIT_ASSIGN(const Backend backend, parse_backend(arguments.backend));
+    RELIT_ASSIGN(const CompositePath path, chosen_path(arguments, backend));
+    RELIT_TRY(frames.open_player(arguments, path));
+    RELIT_ASSIGN(const LoadedLight light, load_light(arguments.light, 3));
+    RELIT_TRY(frames.player->set_light(light));
+    const std::vector<float>& at = arguments.position;
+    frames.player->set_position({at[0], at[1], at[2]});
+    if (arguments.lightmap && path == CompositePath::kCpu) return frames;
+    RELIT_ASSIGN(GlBackend gl, open_backend(backend));
+    frames.context = std::move(gl.context);
+    RELIT_TRY(frames.player->attach(std::move(gl.device)));
+    return frames;
   }
+
+  Status show(std::uint64_t frame) const {
+    for (bool shown = false; !shown;) {
+      RELIT_ASSIGN(shown, player->show_frame(frame, kPatience_s));
+    }
+    return {};
+  }
+
+  std::unique_ptr<gles::OffscreenContext> context;  ///< of the player, which goes first
+  std::unique_ptr<Player> player;
+  container::ClipRecord clip;
+  FrameRange range;
 
  private:
-  const LoadedLight& light_;
-  const ClipReader& clip_;
-  glm::vec3 position_;
-  decoders::Light now_;
+  static constexpr double kPatience_s = 60;
+
+  Status open_player(const Arguments& arguments, CompositePath path) {
+    PlayerOptions options;
+    options.name = arguments.source.name == "-" ? "standard input" : arguments.source.name;
+    options.clip = arguments.clip;
+    options.layers = arguments.layers, options.threads = arguments.threads;
+    options.interpolate = false;
+    options.path = path;
+    options.governor.quality = 1;
+    options.sparing = !arguments.frame.empty() || arguments.time_s >= 0 || arguments.lightmap ||
+                      !arguments.sheet.empty();
+    options.frames = [&](const container::ClipRecord& opened) -> Result<PlayerFrames> {
+      clip = opened;
+      RELIT_ASSIGN(range, chosen_frames(arguments, clip));
+      return PlayerFrames{range.first, range.last};
+    };
+    options.log = [](LogLevel level, const std::string& sentence) {
+      if (level != LogLevel::kInfo) std::fprintf(stderr, "relit: warning: %s\n", sentence.c_str());
+    };
+    RELIT_ASSIGN(auto source,
+                 open_source(arguments.source, options.sparing || arguments.layers >= 0));
+    RELIT_ASSIGN(player, Player::open(std::move(source), options));
+    player->set_paused(true);
+    return range.single && range.first < range.last ? find(arguments.time_s) : Status();
+  }
+
+  // Which frame is shown at a time.
+  Status find(double time_s) {
+    RELIT_TRY(player->seek(time_s));
+    for (bool here = false; !here;) {
+      RELIT_ASSIGN(here, player->wait(kPatience_s));
+    }
+    range.first = range.last = player->moment().frame;
+    return {};
+  }
 };
 
-Status render_lightmap(const Arguments& arguments, ClipReader& clip, const LoadedLight& light,
-                       Backend backend) {
-  GlBackend gl;
-  RELIT_ASSIGN(const CompositePath path, chosen_path(arguments, backend));
-  if (path != CompositePath::kCpu) {
-    RELIT_ASSIGN(gl, open_backend(backend));
-  }
-  RELIT_ASSIGN(auto relighter,
-               Relighter::create(clip.model(), clip.layers(), {gl.device.get(), path}));
-  RELIT_TRY(relighter->set_light(light.light, decoded_layers(clip, arguments.layers)));
-  RELIT_ASSIGN(const FrameRange range, chosen_frames(arguments, clip));
-  std::vector<std::uint64_t> shape{3, clip.model().height, clip.model().width};
+Status render_lightmap(const Arguments& arguments, Frames& frames) {
+  const FrameRange& range = frames.range;
+  const Player::Size size = frames.player->light_map_size();
+  std::vector<std::uint64_t> shape{3, static_cast<std::uint64_t>(size.height),
+                                   static_cast<std::uint64_t>(size.width)};
   if (!range.single) shape.insert(shape.begin(), range.last - range.first + 1);
   RELIT_ASSIGN(
       decoders::NpyWriter writer,
       decoders::NpyWriter::create(arguments.output, decoders::NpyWriter::Type::kFloat32, shape));
-  std::vector<float> map(std::size_t{3} * clip.model().height * clip.model().width);
-  ClipFrame frame;
-  LightOfFrame varied(arguments, light, clip);
+  std::vector<float> map(std::size_t{3} * static_cast<std::size_t>(size.height) *
+                         static_cast<std::size_t>(size.width));
   for (std::uint64_t k = range.first; k <= range.last; ++k) {
-    RELIT_TRY(clip.frame(k, frame));
-    if (const decoders::Light* now = varied.at(k))
-      RELIT_TRY(relighter->set_light(*now, decoded_layers(clip, arguments.layers)));
-    RELIT_TRY(relighter->composite({&frame.planes}));
-    RELIT_TRY(relighter->read(map));
+    RELIT_TRY(frames.show(k));
+    RELIT_TRY(frames.player->read_light_map(map));
     RELIT_TRY(writer.write(std::span<const float>(map)));
   }
   return writer.commit();
 }
 
-// A scene off the screen.
+// Frames as pictures, off the screen.
 class PictureRenderer {
  public:
-  static Result<std::unique_ptr<PictureRenderer>> create(const Arguments& arguments,
-                                                         const ClipReader& clip,
-                                                         const LoadedLight& light, Backend backend,
-                                                         Size size) {
-    std::unique_ptr<PictureRenderer> self(new PictureRenderer);
-    ViewOptions options = arguments.view;
-    options.layers = arguments.layers;
-    RELIT_ASSIGN(options.composite, chosen_path(arguments, backend));
+  static Result<PictureRenderer> create(const Arguments& arguments, const Frames& frames,
+                                        const Look& look, Size size) {
+    OrbitCamera camera;
     if (!arguments.camera.empty()) {
-      RELIT_ASSIGN(options.camera, parse_camera(arguments.camera));
+      RELIT_ASSIGN(camera, parse_camera(arguments.camera));
     }
-    self->camera_ = options.camera;
-    RELIT_ASSIGN(self->gl_, open_backend(backend));
-    RELIT_ASSIGN(self->scene_, SceneView::create(clip, *self->gl_.device, options));
-    for (const std::string& warning : self->scene_->warnings())
-      std::fprintf(stderr, "relit: warning: %s\n", warning.c_str());
-    RELIT_TRY(self->scene_->set_light(light));
-    RELIT_ASSIGN(
-        auto framebuffer,
-        gles::Framebuffer::create(*self->gl_.device, {size.width, size.height, arguments.samples}));
-    self->framebuffer_ = std::make_unique<gles::Framebuffer>(std::move(framebuffer));
-    return self;
+    RELIT_ASSIGN(auto framebuffer,
+                 gles::Framebuffer::create(*frames.player->device(),
+                                           {size.width, size.height, arguments.samples}));
+    return PictureRenderer(frames, look, camera, std::move(framebuffer));
   }
 
-  // `light` null: as it was.
-  Status draw(const ClipFrame& frame, const decoders::Light* light, std::span<std::uint8_t> rgba) {
-    if (light != nullptr) RELIT_TRY(scene_->vary_light(*light));
-    RELIT_TRY(scene_->set_frame(frame));
-    framebuffer_->bind();
-    RELIT_TRY(scene_->draw(camera_, framebuffer_->draw_width(), framebuffer_->draw_height()));
-    RELIT_TRY(framebuffer_->resolve());
-    return framebuffer_->read_back(rgba);
+  Status draw(std::uint64_t frame, std::span<std::uint8_t> rgba) {
+    RELIT_TRY(frames_.show(frame));
+    framebuffer_.bind();
+    Player& player = *frames_.player;
+    RELIT_TRY(player.draw(
+        look_at(player, look_, camera_, {framebuffer_.draw_width(), framebuffer_.draw_height()}),
+        look_.backdrop));
+    RELIT_TRY(framebuffer_.resolve());
+    return framebuffer_.read_back(rgba);
   }
 
  private:
-  PictureRenderer() = default;
+  PictureRenderer(const Frames& frames, const Look& look, const OrbitCamera& camera,
+                  gles::Framebuffer framebuffer)
+      : frames_(frames), look_(look), camera_(camera), framebuffer_(std::move(framebuffer)) {}
 
-  GlBackend gl_;  // goes last
-  std::unique_ptr<SceneView> scene_;
-  std::unique_ptr<gles::Framebuffer> framebuffer_;
+  const Frames& frames_;
+  Look look_;
   OrbitCamera camera_;
+  gles::Framebuffer framebuffer_;
 };
 
 // Pictures side by side in one.
-Status render_sheet(const Arguments& arguments, ClipReader& clip, PictureRenderer& renderer,
-                    LightOfFrame& light, const FrameRange& range, Size size) {
+Status render_sheet(const Arguments& arguments, PictureRenderer& renderer, const FrameRange& range,
+                    Size size) {
   RELIT_ASSIGN(const Size cells, parse_size(arguments.sheet, "--sheet", 64));
   PictureWriter::Options options;
   options.path = arguments.output;
@@ -191,11 +219,9 @@ Status render_sheet(const Arguments& arguments, ClipReader& clip, PictureRendere
                                   static_cast<std::size_t>(cells.height));
   const auto count =
       static_cast<std::uint64_t>(cells.width) * static_cast<std::uint64_t>(cells.height);
-  ClipFrame frame;
   for (std::uint64_t i = 0; i < count; ++i) {
     const std::uint64_t k = range.first + i * (range.last - range.first + 1) / count;
-    RELIT_TRY(clip.frame(k, frame));
-    RELIT_TRY(renderer.draw(frame, light.at(k), picture));
+    RELIT_TRY(renderer.draw(k, picture));
     const auto column = i % static_cast<std::uint64_t>(cells.width),
                row = i / static_cast<std::uint64_t>(cells.width);
     for (std::size_t y = 0; y < static_cast<std::size_t>(size.height); ++y) {
@@ -211,48 +237,37 @@ Status render_sheet(const Arguments& arguments, ClipReader& clip, PictureRendere
   return writer->finish();
 }
 
-Status render_pictures(const Arguments& arguments, ClipReader& clip, const LoadedLight& light,
-                       Backend backend) {
+Status render_pictures(const Arguments& arguments, const Frames& frames, const Look& look) {
   RELIT_ASSIGN(const Size size, parse_size(arguments.size, "--size", 8192));
-  RELIT_ASSIGN(const FrameRange range, chosen_frames(arguments, clip));
-  RELIT_ASSIGN(auto renderer, PictureRenderer::create(arguments, clip, light, backend, size));
-  LightOfFrame varied(arguments, light, clip);
-  if (!arguments.sheet.empty())
-    return render_sheet(arguments, clip, *renderer, varied, range, size);
+  RELIT_ASSIGN(PictureRenderer renderer, PictureRenderer::create(arguments, frames, look, size));
+  const FrameRange& range = frames.range;
+  if (!arguments.sheet.empty()) return render_sheet(arguments, renderer, range, size);
   PictureWriter::Options options;
   options.path = arguments.output;
   options.width = size.width, options.height = size.height;
-  options.tick_rate = clip.clip().tick_rate;
+  options.tick_rate = frames.clip.tick_rate;
   options.pictures = range.last - range.first + 1;
   RELIT_ASSIGN(auto writer, PictureWriter::create(options));
   std::vector<std::uint8_t> picture(std::size_t{4} * static_cast<std::size_t>(size.width) *
                                     static_cast<std::size_t>(size.height));
-  ClipFrame frame;
   for (std::uint64_t k = range.first; k <= range.last; ++k) {
-    RELIT_TRY(clip.frame(k, frame));
-    RELIT_TRY(renderer->draw(frame, varied.at(k), picture));
-    RELIT_TRY(writer->add(picture, clip.ticks_of(k)));
+    RELIT_TRY(renderer.draw(k, picture));
+    RELIT_TRY(writer->add(picture, frames.player->ticks_of(k)));
   }
   return writer->finish();
 }
 
-Status render(const Arguments& arguments, ClipReader& clip) {
-  RELIT_ASSIGN(const Backend backend, parse_backend(arguments.backend));
-  RELIT_ASSIGN(const LoadedLight light, load_light(arguments.light, 3));
-  if (arguments.lightmap) return render_lightmap(arguments, clip, light, backend);
-  return render_pictures(arguments, clip, light, backend);
+Result<PlaybackLoss> render(const Arguments& arguments) {
+  RELIT_ASSIGN(const Look look, parse_look(arguments.look));
+  RELIT_ASSIGN(Frames frames, Frames::open(arguments));
+  RELIT_TRY(arguments.lightmap ? render_lightmap(arguments, frames)
+                               : render_pictures(arguments, frames, look));
+  return frames.player->stats().loss;
 }
 
 int run(const Arguments& arguments) {
-  ClipOptions options;
-  options.clip = arguments.clip, options.layers = arguments.layers,
-  options.threads = arguments.threads;
-  options.sparing = !arguments.frame.empty() || arguments.time_s >= 0 || arguments.lightmap ||
-                    !arguments.sheet.empty();
-  auto clip = open_clip(arguments.source, options);
-  if (!clip) return report(clip.error());
-  if (const Status status = render(arguments, *clip); !status) return report(status.error());
-  return report_loss(clip->loss());
+  const auto loss = render(arguments);
+  return loss ? report_loss(*loss) : report(loss.error());
 }
 
 constexpr const char* kExamples = R"(Examples:
@@ -286,7 +301,7 @@ Command add_render(CLI::App& app) {
       ->check(CLI::NonNegativeNumber);
   command->add_option("--clip", a->clip, "by name or number");
   command->add_option("--size", a->size, "of the picture")->capture_default_str();
-  add_view_options(*command, a->view, a->camera);
+  add_look_options(*command, a->look, a->camera);
   command->add_option("--backend", a->backend, "egl, egl-es2, egl-es2-mediump, osmesa or cpu")
       ->capture_default_str();
   command->add_option("--composite", a->composite,
@@ -294,8 +309,8 @@ Command add_render(CLI::App& app) {
                       "backend says");
   command->add_option("--layers", a->layers,
                       "only the first so many layers: faster and less accurate");
-  command->add_option("--threads", a->threads, "of each decoder")
-      ->check(CLI::Range(1, 64))
+  command->add_option("--threads", a->threads, "that decode; 0: one a processor")
+      ->check(CLI::Range(0, 64))
       ->capture_default_str();
   command->add_option("--samples", a->samples, "a pixel, against jagged edges: 1, 4 or 16")
       ->check(CLI::IsMember({1, 4, 16}))

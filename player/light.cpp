@@ -88,6 +88,7 @@ Status check_options(const LightOptions& options) {
 Status read_light(const std::string& path, const LightOptions& options, LoadedLight& loaded) {
   RELIT_ASSIGN(const std::vector<std::uint8_t> bytes, read_file(path));
   if (bytes.empty()) return fail(ErrorCode::kTruncated, "the file is empty");
+  decoders::Environment picture;
   switch (format_of(path, bytes)) {
     case Format::kUnknown:
       return fail(ErrorCode::kUnsupported,
@@ -106,14 +107,15 @@ Status read_light(const std::string& path, const LightOptions& options, LoadedLi
       return {};
     }
     case Format::kHdr: {
-      RELIT_ASSIGN(loaded.environment, read_hdr(bytes));
+      RELIT_ASSIGN(picture, read_hdr(bytes));
       break;
     }
     case Format::kExr: {
-      RELIT_ASSIGN(loaded.environment, read_exr(bytes, loaded.warnings));
+      RELIT_ASSIGN(picture, read_exr(bytes, loaded.warnings));
       break;
     }
   }
+  loaded.environment = std::make_shared<const decoders::Environment>(std::move(picture));
   const decoders::Environment& environment = *loaded.environment;
   RELIT_ASSIGN(loaded.light, decoders::project_environment(environment, options.order));
   if (environment.width != 2 * environment.height) {

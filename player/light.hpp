@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -23,8 +24,8 @@ struct LoadedLight {
   decoders::Light light;  ///< turned and windowed as asked; of a field its mean, for the exposure
   std::optional<LightField> field;  ///< of a light that varies; turned and windowed likewise
   /// The picture as the file has it, for drawing the background; a direction's φ is
-  /// φ(picture) + environment_rotation_rad. None for a .json.
-  std::optional<decoders::Environment> environment;
+  /// φ(picture) + environment_rotation_rad. Null for a .json.
+  std::shared_ptr<const decoders::Environment> environment;
   double environment_rotation_rad = 0;
   std::string name;  ///< the file's, without folder and suffix
   /// The least radiance of `light` over all directions, per channel. Below zero where cutting the

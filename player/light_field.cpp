@@ -100,6 +100,12 @@ std::size_t ProbeGrid::count() const {
          static_cast<std::size_t>(size[2]);
 }
 
+Result<LightField> LightField::steady(decoders::Light light) {
+  LightFieldParts parts;
+  parts.lights.push_back(std::move(light));
+  return create(std::move(parts));
+}
+
 Result<LightField> LightField::create(LightFieldParts parts) {
   RELIT_TRY(check_grid(parts.grid));
   RELIT_TRY(check_times(parts));

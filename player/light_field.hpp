@@ -51,6 +51,8 @@ class LightField {
   /// 4, 9 or 16 rows or of different orders, times that do not ascend, spacing that is not
   /// positive, a period that is too short, or counts that do not fit; kLimit beyond the above.
   static Result<LightField> create(LightFieldParts parts);
+  /// One light, always and everywhere. Errors: as create().
+  static Result<LightField> steady(decoders::Light light);
 
   /// The light at a time and place, into `out`, which keeps its memory: no allocation once it has
   /// been used with this field. Before the first key, and after the last one if it does not loop,

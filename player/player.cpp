@@ -60,6 +60,8 @@ PrefetchOptions Player::State::prefetch_options(std::size_t layer_count, bool ro
   prefetch.decoder = options.decoder;
   prefetch.memory = options.pictures;
   prefetch.loop = round;
+  prefetch.every = static_cast<std::uint64_t>(governor->quality().frames_every);
+  if (options.sparing) prefetch.ring_bytes = 0, prefetch.packet_bytes = 1;
   return prefetch;
 }
 
@@ -97,8 +99,13 @@ Status Player::State::plan_and_start(ClipDemuxer demuxer) {
   posed.emplace(statics->meshes);
 
   // What only goes forward does not come round.
-  if (!shared) playback->set_loop(LoopMode::kOff);
-  const PrefetchOptions prefetch = prefetch_options(demuxer.layers().size(), playback->loops());
+  const auto choose = std::exchange(options.frames, nullptr);
+  if (!shared || choose) playback->set_loop(LoopMode::kOff);
+  PrefetchOptions prefetch = prefetch_options(demuxer.layers().size(), playback->loops());
+  if (choose) {
+    RELIT_ASSIGN(const PlayerFrames frames, choose(demuxer.clip()));
+    prefetch.first_frame = frames.first, prefetch.end_frame = frames.last + 1;
+  }
   RELIT_ASSIGN(primary, ClipVoice::create(wanted, std::move(demuxer), pool, prefetch));
   primary_item = {program, std::size_t{0}};
   RELIT_TRY(attach_voice(*primary));
@@ -126,6 +133,13 @@ Status Player::set_light(LightField field, std::shared_ptr<const decoders::Envir
                          double environment_rotation_rad) {
   state_->light->set(std::move(field), std::move(environment), environment_rotation_rad);
   return {};
+}
+
+Status Player::set_light(const LoadedLight& light) {
+  if (light.field)
+    return set_light(*light.field, light.environment, light.environment_rotation_rad);
+  RELIT_ASSIGN(LightField field, LightField::steady(light.light));
+  return set_light(std::move(field), light.environment, light.environment_rotation_rad);
 }
 
 Status Player::turn_light(double angle_rad) { return state_->light->turn(angle_rad); }
@@ -214,6 +228,11 @@ Status Player::set_layers(int layers) {
   return {};
 }
 
+void Player::set_planes(int planes) {
+  state_->planes = planes;
+  state_->recomposite = true;
+}
+
 void Player::set_interpolation(bool on) { state_->options.interpolate = on; }
 
 Status Player::set_path(CompositePath path) {
@@ -232,6 +251,12 @@ Status Player::set_target_fps(double fps) { return state_->governor->set_target_
 
 Status Player::update(std::int64_t now_ns) { return state_->update(now_ns); }
 Result<bool> Player::wait(double timeout_s) { return state_->wait(timeout_s); }
+Result<bool> Player::show_frame(std::uint64_t frame, double timeout_s) {
+  return state_->show_frame(frame, timeout_s);
+}
+std::uint32_t Player::ticks_of(std::uint64_t frame) const {
+  return state_->primary->prefetcher().ticks_of(frame);
+}
 
 void Player::cancel() {
   state_->cancelled.store(true);

@@ -20,6 +20,7 @@
 #include "gles/view.hpp"
 #include "player/governor.hpp"
 #include "player/interrupt.hpp"
+#include "player/light.hpp"
 #include "player/light_field.hpp"
 #include "player/memory_plan.hpp"
 #include "player/path_chooser.hpp"
@@ -31,6 +32,10 @@ namespace relit::player {
 
 enum class LogLevel { kError = 0, kWarning = 1, kInfo = 2 };
 
+struct PlayerFrames {
+  std::uint64_t first = 0, last = 0;
+};
+
 struct PlayerOptions {
   std::string name;         ///< of the source, for messages
   std::string clip;         ///< by name or number; empty: the first
@@ -41,9 +46,14 @@ struct PlayerOptions {
   std::optional<std::uint64_t> memory_budget_bytes;
   std::optional<DrawingScale> drawing;  ///< what the plan counts besides: see MemoryWishes
   GovernorOptions governor;
-  std::string decoder;               ///< tried first, by libavcodec's name
-  bool sparing = false;              ///< not everything will be played: fetch only what is needed
-  std::shared_ptr<WorkerPool> pool;  ///< null: one of its own
+  std::string decoder;  ///< tried first, by libavcodec's name
+  /// Not everything will be played: only what is needed is fetched, and the next frame at most.
+  bool sparing = false;
+  /// Of the clip that is opened, given its record: which frames are shown, the first of them first.
+  /// Nothing else is fetched unless playback goes there, and it does not go round. Its errors are
+  /// those of open(). Null: all.
+  std::function<Result<PlayerFrames>(const container::ClipRecord&)> frames;
+  std::shared_ptr<WorkerPool> pool;      ///< null: one of its own
   std::shared_ptr<Interrupt> interrupt;  ///< what the source polls; null: it cannot be stopped
   /// Where the pictures of decoders are; null: in the runtime's memory.
   std::shared_ptr<decoders::PictureMemory> pictures;
@@ -83,6 +93,7 @@ struct PlayerStats {
   std::uint64_t updates = 0, shown = 0, repeated = 0, late = 0, waiting = 0;
   std::uint64_t skipped_frames = 0;  ///< of the clip, that were due and never shown
   std::uint64_t composites = 0;
+  std::uint64_t planes_uploaded = 0;  ///< to the GPU, of the clip that is playing
   PlaybackLoss loss;
   PrefetchStats prefetch;  ///< of the clip that is playing
   double decode_ms = 0;    ///< of pool threads, for a frame; means since the player was opened
@@ -138,6 +149,7 @@ class Player {
   /// Errors: kInvalid for numbers that are not finite or another count of rows; the old one stays.
   Status set_light(LightField field, std::shared_ptr<const decoders::Environment> environment,
                    double environment_rotation_rad);
+  Status set_light(const LoadedLight& light);
   /// Turns light and environment about +Y from how they were set.
   Status turn_light(double angle_rad);
   /// Where the character stands in the light field.
@@ -161,6 +173,8 @@ class Player {
 
   /// The first so many layers; -1: all that the plan allows.
   Status set_layers(int layers);
+  /// The first so many planes, of those that the governor leaves; -1: all.
+  void set_planes(int planes);
   void set_interpolation(bool on);
   Status set_path(CompositePath path);
   Status set_quality(std::optional<double> quality);
@@ -176,6 +190,11 @@ class Player {
   /// Waits for the frame of the moment, without moving the clock, and shows it. False: not within
   /// `timeout_s`. Errors: as update(), and those of Prefetcher::wait().
   Result<bool> wait(double timeout_s);
+  /// Goes to a frame of the clip that plays and waits for it, wherever it is; one that damage hit
+  /// shows the last good one. As wait().
+  Result<bool> show_frame(std::uint64_t frame, double timeout_s);
+  /// How many ticks a frame that has been shown lasts.
+  [[nodiscard]] std::uint32_t ticks_of(std::uint64_t frame) const;
   /// Makes wait() and the source return, for good. Any thread.
   void cancel();
 

@@ -83,10 +83,11 @@ Status Player::State::set_backdrop(const Backdrop& wanted) {
   const bool picture = wanted.kind == Backdrop::Kind::kLight && environment != nullptr;
   const bool harmonics = !picture && (wanted.kind == Backdrop::Kind::kLight ||
                                       wanted.kind == Backdrop::Kind::kHarmonics);
-  // Harmonics are taken as they shine now, turned already.
-  renderer.set_rotation(picture ? static_cast<float>(light->environment_rotation_rad()) : 0.0f);
-  const bool same =
-      backdrop == wanted && backdrop_light == light->generation() && !(harmonics && backdrop_stale);
+  renderer.set_rotation(picture     ? static_cast<float>(light->environment_rotation_rad())
+                        : harmonics ? static_cast<float>(light->turn_rad())
+                                    : 0.0f);
+  const bool same = backdrop == wanted && backdrop_light == light->generation() &&
+                    !(harmonics && backdrop_harmonics != light->unturned_generation());
   if (same) return {};
   gles::Background background;
   std::vector<std::array<float, 3>> rows;
@@ -97,7 +98,7 @@ Status Player::State::set_backdrop(const Backdrop& wanted) {
     background.max_side = kBackgroundSide;
   } else if (harmonics) {
     background.kind = gles::Background::Kind::kHarmonics;
-    for (const auto& row : light->now().sh)
+    for (const auto& row : light->unturned().sh)
       rows.push_back(
           {static_cast<float>(row[0]), static_cast<float>(row[1]), static_cast<float>(row[2])});
     background.harmonics = rows;
@@ -110,7 +111,7 @@ Status Player::State::set_backdrop(const Backdrop& wanted) {
   RELIT_TRY(renderer.set(background));
   backdrop = wanted;
   backdrop_light = light->generation();
-  backdrop_stale = false;
+  backdrop_harmonics = light->unturned_generation();
   return {};
 }
 
@@ -251,6 +252,7 @@ PlayerStats Player::State::stats() const {
   stats.pose_ms = 1e3 * pose_s.value();
   stats.draw_ms = 1e3 * draw_s.value();
   stats.composites = relighter.stats().composites;
+  stats.planes_uploaded = relighter.stats().planes_uploaded;
   stats.gpu_bytes = relighter.gpu_bytes() + (character ? character->renderer().gpu_bytes() : 0);
   stats.quality = governor->value();
   stats.chosen = governor->quality();

@@ -7,18 +7,30 @@
 #include "decoders/sh_constants.hpp"
 
 namespace relit::player {
+namespace {
+
+// Under which a white surface in that light is a little below white.
+float exposure_for(const decoders::Light& light) {
+  const auto& rgb = light.sh.front();
+  const double luminance = (0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]) * decoders::kBand0;
+  return luminance > 0 ? static_cast<float>(0.8 / luminance) : 1.0f;
+}
+
+}  // namespace
+
+PlayerLight::PlayerLight(LightField field)
+    : field_(std::move(field)), auto_exposure_(exposure_for(field_.mean())) {}
 
 Result<PlayerLight> PlayerLight::create() {
-  LightFieldParts white;
   const double level = 1 / decoders::kBand0;
-  white.lights.push_back({{{level, level, level}}});
-  RELIT_ASSIGN(LightField field, LightField::create(std::move(white)));
+  RELIT_ASSIGN(LightField field, LightField::steady({{{level, level, level}}}));
   return PlayerLight(std::move(field));
 }
 
 void PlayerLight::set(LightField field, std::shared_ptr<const decoders::Environment> environment,
                       double rotation_rad) {
   field_ = std::move(field);
+  auto_exposure_ = exposure_for(field_.mean());
   environment_ = std::move(environment);
   rotation_rad_ = rotation_rad;
   turn_rad_ = 0;
@@ -29,7 +41,7 @@ void PlayerLight::set(LightField field, std::shared_ptr<const decoders::Environm
 Status PlayerLight::turn(double angle_rad) {
   if (!std::isfinite(angle_rad))
     return fail(ErrorCode::kInvalid, "the angle by which to turn a light is not finite");
-  stale_ |= angle_rad != turn_rad_;
+  turned_ |= angle_rad != turn_rad_;
   turn_rad_ = angle_rad;
   return {};
 }
@@ -40,19 +52,17 @@ void PlayerLight::set_position(const glm::vec3& position) {
 }
 
 bool PlayerLight::sample(double time_s) {
-  if (!stale_ && !(field_.varies_in_time() && time_s != sampled_s_)) return false;
-  field_.sample(time_s, position_, now_);
+  stale_ |= field_.varies_in_time() && time_s != sampled_s_;
+  if (!stale_ && !turned_) return false;
+  if (stale_) {
+    field_.sample(time_s, position_, unturned_);
+    ++unturned_generation_;
+  }
+  now_ = unturned_;
   if (turn_rad_ != 0) decoders::rotate_light_y(now_, turn_rad_);
   sampled_s_ = time_s;
-  stale_ = false;
+  stale_ = turned_ = false;
   return true;
-}
-
-float PlayerLight::auto_exposure() const {
-  const decoders::Light mean = field_.mean();
-  const auto& rgb = mean.sh.front();
-  const double luminance = (0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]) * decoders::kBand0;
-  return luminance > 0 ? static_cast<float>(0.8 / luminance) : 1.0f;
 }
 
 }  // namespace relit::player

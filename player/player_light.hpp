@@ -27,29 +27,34 @@ class PlayerLight {
   /// Brings now() up to a time. True: it has changed since the last call.
   bool sample(double time_s);
   [[nodiscard]] const decoders::Light& now() const { return now_; }
+  /// The same before it was turned by turn().
+  [[nodiscard]] const decoders::Light& unturned() const { return unturned_; }
   /// Whether it changes with time by itself.
   [[nodiscard]] bool varies() const { return field_.varies_in_time(); }
 
   /// Counts every set(): whether a picture of the light has to be made again.
   [[nodiscard]] unsigned generation() const { return generation_; }
+  /// Counts the changes of unturned(): the same for its harmonics.
+  [[nodiscard]] unsigned unturned_generation() const { return unturned_generation_; }
   [[nodiscard]] const decoders::Environment* environment() const { return environment_.get(); }
   [[nodiscard]] double environment_rotation_rad() const { return rotation_rad_ + turn_rad_; }
   [[nodiscard]] double turn_rad() const { return turn_rad_; }
 
   /// Radiance × this: a white surface in the mean of the whole light is a little below white.
-  [[nodiscard]] float auto_exposure() const;
+  [[nodiscard]] float auto_exposure() const { return auto_exposure_; }
 
  private:
-  explicit PlayerLight(LightField field) : field_(std::move(field)) {}
+  explicit PlayerLight(LightField field);
 
   LightField field_;
   std::shared_ptr<const decoders::Environment> environment_;
   double rotation_rad_ = 0, turn_rad_ = 0;
   glm::vec3 position_{0.0f};
-  decoders::Light now_;
+  decoders::Light unturned_, now_;
   double sampled_s_ = 0;
-  unsigned generation_ = 0;
-  bool stale_ = true;
+  float auto_exposure_ = 1;
+  unsigned generation_ = 0, unturned_generation_ = 0;
+  bool stale_ = true, turned_ = false;
 };
 
 }  // namespace relit::player

@@ -78,6 +78,7 @@ struct Player::State final : FrameTimes {
   void note_shown(const Moment& now);
   [[nodiscard]] bool stands(std::int64_t now_ns);
   Result<bool> wait(double timeout_s);
+  Result<bool> show_frame(std::uint64_t frame, double timeout_s);
   Result<bool> wait_for(ClipVoice& voice, const FramePosition& position, double timeout_s);
   Status source_error();
 
@@ -99,7 +100,7 @@ struct Player::State final : FrameTimes {
   std::shared_ptr<const ClipDemuxer::Statics> statics;
   std::shared_ptr<WorkerPool> pool;
   MemoryPlan plan;
-  int layers = -1;
+  int layers = -1, planes = -1;
 
   std::optional<Playback> playback;
   std::optional<Governor> governor;
@@ -147,7 +148,7 @@ struct Player::State final : FrameTimes {
   std::unique_ptr<Character> character;
   std::optional<Backdrop> backdrop;  ///< that the renderer has; none: none yet
   unsigned backdrop_light = 0;       ///< PlayerLight::generation() that it was made of
-  bool backdrop_stale = true;        ///< the harmonics behind have changed
+  unsigned backdrop_harmonics = 0;   ///< likewise unturned_generation()
   bool positions_uploaded = false;
   float exposure = 0;  ///< that relighters know
   std::uint64_t draws = 0;

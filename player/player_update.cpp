@@ -82,9 +82,7 @@ Status Player::State::show(const Moment& now, bool at_once) {
   RELIT_TRY(bring_light(anew));
   const Quality quality = governor->quality();
   const bool blend = options.interpolate && quality.frames_every == 1;
-  FramePosition position = now.primary;
-  position.frame -= position.frame % static_cast<unsigned>(quality.frames_every);
-  primary_frames = primary->go_to(position, blend);
+  primary_frames = primary->go_to(now.primary, blend);
   secondary_frames = {};
   if (now.secondary) secondary_frames = secondary->go_to(*now.secondary, blend);
   const bool both = secondary_frames.from != nullptr;
@@ -149,25 +147,21 @@ Status Player::State::bring_light(bool& changed) {
   const bool settle =
       !layers_settled && !light->varies() && counted.updates - light_changed_at >= kRestingUpdates;
   layers_settled |= settle;
-  if (moved) backdrop_stale = true;
   const Quality quality = governor->quality();
   for (ClipVoice* voice : voices()) {
     if (voice == nullptr) continue;
-    std::size_t planes = 0;
-    for (const container::LayerRecord& layer : voice->prefetcher().layers())
-      planes += layer.planes.size();
+    Relighter& relighter = *voice->relighter();
+    const std::size_t of = relighter.needed_planes().size();
     RelightQuality relight;
     if (quality.planes_share < 1)
-      relight.planes = std::max(
-          1, static_cast<int>(std::ceil(quality.planes_share * static_cast<double>(planes))));
+      relight.planes =
+          std::max(1, static_cast<int>(std::ceil(quality.planes_share * static_cast<double>(of))));
+    if (planes >= 0)
+      relight.planes = relight.planes < 0 ? planes : std::min(relight.planes, planes);
     relight.half_size = quality.half_size;
-    // First, as it decides which layers are needed.
-    const bool traded = voice->relighter()->set_quality(relight);
-    if (fold) {
-      RELIT_TRY(voice->set_light(light->now()));
-    } else if (traded || recomposite || settle) {
-      RELIT_TRY(voice->fetch_needed(settle));
-    }
+    relighter.set_quality(relight);
+    voice->prefetcher().set_every(static_cast<std::uint64_t>(quality.frames_every));
+    RELIT_TRY(fold ? voice->set_light(light->now()) : voice->fetch_needed(settle));
   }
   light_stale = false;
   return {};
@@ -269,6 +263,27 @@ Result<bool> Player::State::wait(double timeout_s) {
   }
   RELIT_TRY(catch_out_of_memory("showing a frame", [&] { return show(now, true); }));
   return here && !moment.late;
+}
+
+// Where frames are unevenly spaced, when this one is shown becomes known as it comes; of one whose
+// segment is lost it never does, and what is shown stays.
+Result<bool> Player::State::show_frame(std::uint64_t frame, double timeout_s) {
+  const Clock::time_point begin = Clock::now();
+  Prefetcher& prefetcher = primary->prefetcher();
+  // Seeking would go to the last one.
+  if (frame >= prefetcher.clip().frame_count) return prefetcher.wait(frame, 0);
+  Status sought = playback->seek_frame(frame);
+  if (!sought) {
+    prefetcher.want(frame);
+    RELIT_ASSIGN(const bool here, prefetcher.wait(frame, timeout_s));
+    if (!here) return false;
+    sought = playback->seek_frame(frame);
+    if (!sought && moment.ready) return prefetcher.frame(frame) != nullptr;
+  }
+  RELIT_TRY(sought);
+  light_time_s = playback->now().time_s;
+  jumped();
+  return wait(std::max(0.0, timeout_s - seconds_since(begin)));
 }
 
 }  // namespace relit::player

@@ -10,7 +10,13 @@ namespace relit::player {
 using State = Prefetcher::State;
 
 std::uint64_t State::lap_end() const {
-  return loop && lap_start < loop_end ? loop_end : demuxer.clip().frame_count;
+  return loop && lap_start < loop_end ? loop_end : end_after(lap_start);
+}
+
+// Where going on from a frame ends that does not go round.
+std::uint64_t State::end_after(std::uint64_t frame) const {
+  const std::uint64_t count = demuxer.clip().frame_count;
+  return frame < end_frame && end_frame < count ? end_frame : count;
 }
 
 /// Back-pressure: chunks may wait up to their limit, and beyond it only where a decoder or the ring

@@ -23,16 +23,16 @@ void State::note_peaks() {
 
 State::Slot* State::find(std::uint64_t index) {
   for (std::uint64_t seq = head; seq < tail; ++seq) {
-    if (at(seq).index == index) return &at(seq);
+    if (at(seq).shows(index)) return &at(seq);
   }
   return nullptr;
 }
 
 std::optional<std::uint64_t> State::following(std::uint64_t index) const {
   const std::uint64_t count = demuxer.clip().frame_count;
-  const std::uint64_t next = index + 1;
-  if (loop && (next == loop_end || next >= count)) return loop_begin;
-  if (next >= count) return std::nullopt;
+  const std::uint64_t next = index - index % every + every;
+  if (loop && ((index < loop_end && next >= loop_end) || next >= count)) return loop_begin;
+  if (next >= end_after(index)) return std::nullopt;
   return next;
 }
 
@@ -82,7 +82,12 @@ bool State::admit_one() {
   lay_out(*slot, known ? &*found : nullptr);
   ring[tail++ % ring.size()] = slot;
   next_index = following(index);
-  if (next_index && *next_index <= index) ++admit_lap;
+  const bool around = next_index && *next_index <= index;
+  if (around) ++admit_lap;
+  slot->every = every;
+  slot->until = next_index && !around        ? *next_index
+                : around && index < loop_end ? loop_end
+                                             : end_after(index);
   return true;
 }
 

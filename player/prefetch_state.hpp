@@ -36,6 +36,8 @@ struct Prefetcher::State {
   /// A place of the ring.
   struct Slot {
     std::uint64_t index = 0;       ///< in the clip
+    std::uint64_t until = 0;       ///< the frames before this one, and from `index` on, are this
+    std::uint64_t every = 1;       ///< set_every() when it was admitted
     std::uint64_t segment_no = 0;  ///< see Segment
     std::vector<Part> parts;       ///< by track
     std::size_t missing = 0;       ///< parts that are wanted and not done
@@ -45,6 +47,7 @@ struct Prefetcher::State {
     bool laid_out = false;         ///< `frame` is about this frame
     ClipFrame frame;
     [[nodiscard]] bool good() const { return missing == 0 && !lost; }
+    [[nodiscard]] bool shows(std::uint64_t k) const { return index <= k && k < until; }
   };
   /// A segment whose chunks come or have come. Numbered as they are read.
   struct Segment {
@@ -75,6 +78,7 @@ struct Prefetcher::State {
     std::uint64_t segment_no = 0;  ///< whose chunk is in the decoder; 0: none
     decoders::VideoFrame last;     ///< of the frame before
     std::uint64_t last_seq = 0;
+    std::uint64_t pictures = 0;  ///< of the decoder's that have been counted
 
     std::unique_ptr<WorkerPool::Strand> strand;
   };
@@ -145,6 +149,7 @@ struct Prefetcher::State {
   void after_event();
   void fail_with(Error error);
   [[nodiscard]] std::uint64_t lap_end() const;
+  [[nodiscard]] std::uint64_t end_after(std::uint64_t frame) const;
 
   ClipDemuxer demuxer;  ///< the demux thread's; what never changes is everybody's
   std::shared_ptr<WorkerPool> pool;
@@ -169,6 +174,8 @@ struct Prefetcher::State {
 
   bool loop = false;
   std::uint64_t loop_begin = 0, loop_end = 0;
+  std::uint64_t end_frame = 0;  ///< PrefetchOptions::end_frame
+  std::uint64_t every = 1;      ///< set_every()
 
   std::array<Slot*, 256> ring{};
   std::uint64_t head = 0, tail = 0;  ///< seq

@@ -109,6 +109,7 @@ bool State::begin_step(Lane& lane, std::unique_lock<std::mutex>& lock) {
   if (lane.incoming) {
     lane.decoder = std::exchange(lane.incoming, std::nullopt);
     lane.segment_no = 0;
+    lane.pictures = 0;
   }
   if (lane.epoch != demux_epoch) {
     lane.epoch = demux_epoch;
@@ -258,9 +259,10 @@ bool State::step(Lane& lane) {
   const Slot& slot = at(lane.cursor);
   if (!find_chunk(lane, slot)) return false;
   const std::uint64_t seq = lane.cursor, index = slot.index;
-  const std::uint64_t no = slot.segment_no;
+  const std::uint64_t no = slot.segment_no, apart = slot.every;
   lock.unlock();
 
+  if (lane.decoder) lane.decoder->show_every(apart);
   const auto began = Clock::now();
   Status loaded;
   const bool fresh = lane.chunk.segment_no == no && lane.segment_no != no;
@@ -279,6 +281,12 @@ bool State::step(Lane& lane) {
 
   lock.lock();
   counts.decode_s += took.count();
+  if (lane.decoder) {
+    const std::uint64_t pictures = lane.decoder->pictures();
+    counts.decoded_pictures += pictures - std::exchange(lane.pictures, pictures);
+  } else if (track.pose && fresh) {
+    counts.pose_bytes = track.poses->memory_bytes();
+  }
   if (!loaded) note_damage(loaded.error());
   if (fresh) {
     packet_bytes -= container::storage_bytes(lane.chunk.record);

@@ -36,6 +36,8 @@ Result<std::unique_ptr<Prefetcher>> Prefetcher::create(ClipDemuxer demuxer,
     s.planes = options.planes;
     s.impatient = options.impatient;
     s.start = s.wanted_index = options.first_frame;
+    s.end_frame = options.end_frame;
+    s.every = options.every;
     RELIT_TRY(s.open_tracks(options, std::move(pool)));
     std::unique_ptr<Prefetcher> prefetcher(new Prefetcher(std::move(state)));
     std::vector<std::uint8_t> layers = options.layers;
@@ -77,7 +79,7 @@ void Prefetcher::want(std::uint64_t index) {
   s.wanted_index = index;
   s.underrun = false;
   for (std::uint64_t seq = s.head; seq < s.tail; ++seq) {
-    if (s.at(seq).index != index) continue;
+    if (!s.at(seq).shows(index)) continue;
     s.release_before(seq);
     s.eager = true;
     s.admit();
@@ -239,6 +241,12 @@ Status Prefetcher::set_layers(std::span<const std::uint8_t> wanted, bool now) {
     }
     for (std::size_t t = 0; t < s.tracks.size(); ++t) s.tracks[t]->enabled = (*by_track)[t] != 0;
     s.wanted = std::move(by_track);
+    // What has been read ahead of layers that go is not decoded any more.
+    for (State::Segment& segment : s.segments) {
+      auto left = std::make_shared<std::vector<std::uint8_t>>(*segment.wanted);
+      for (std::size_t t = 0; t < left->size(); ++t) (*left)[t] &= (*s.wanted)[t];
+      segment.wanted = std::move(left);
+    }
     s.wanted_layers.assign(wanted.begin(), wanted.end());
     s.wanted_changed = true;
     if (now && s.demuxer.seekable()) s.restart(s.wanted_index, std::nullopt);
@@ -264,6 +272,11 @@ Status Prefetcher::set_loop(bool loop, std::uint64_t begin, std::uint64_t end) {
   if (s.thread.joinable() && s.demuxer.seekable()) s.restart(s.wanted_index, std::nullopt);
   s.work.notify_one();
   return {};
+}
+
+void Prefetcher::set_every(std::uint64_t n) {
+  const std::lock_guard lock(state_->mutex);
+  state_->every = n;
 }
 
 void Prefetcher::set_limits(std::size_t ring_bytes, std::size_t packet_bytes) {

@@ -35,6 +35,9 @@ struct PrefetchOptions {
   std::shared_ptr<decoders::PictureMemory> memory;
   std::string decoder;            ///< tried first, by libavcodec's name; empty: software
   std::uint64_t first_frame = 0;  ///< where to begin
+  /// Nothing is fetched for frames from this one on, unless playback goes there; 0: the clip's end.
+  std::uint64_t end_frame = 0;
+  std::uint64_t every = 1;  ///< see set_every()
   /// The first picture after the beginning or a jump need not wait for all layers: frame() gives it
   /// with `complete` false as soon as the pose and the most important layer are there.
   bool impatient = true;
@@ -53,16 +56,18 @@ struct PrefetchStats {
     int decoders = 1;         ///< which take the segments in turn
   };
   std::vector<Track> tracks;
-  std::uint64_t decoded_frames = 0;  ///< complete ones
-  std::uint64_t underruns = 0;       ///< frames that were asked for before they were there
-  std::uint64_t restarts = 0;        ///< jumps that threw away what had been fetched
-  double first_picture_s = 0;        ///< from create() to the first picture; 0: none yet
-  double decode_s = 0;               ///< that the pool's threads worked for this one
-  std::size_t ring_frames = 0;       ///< complete ones ahead of playback, the present one included
+  std::uint64_t decoded_frames = 0;    ///< complete ones
+  std::uint64_t decoded_pictures = 0;  ///< that the codecs gave for them, of all tracks
+  std::uint64_t underruns = 0;         ///< frames that were asked for before they were there
+  std::uint64_t restarts = 0;          ///< jumps that threw away what had been fetched
+  double first_picture_s = 0;          ///< from create() to the first picture; 0: none yet
+  double decode_s = 0;                 ///< that the pool's threads worked for this one
+  std::size_t ring_frames = 0;  ///< complete ones ahead of playback, the present one included
   std::size_t ring_bytes = 0, ring_bytes_peak = 0;
   std::size_t packet_bytes = 0, packet_bytes_peak = 0;
   /// Everything in the decoders' buffers: the ring, reference pictures, those being decoded.
   std::size_t picture_bytes = 0, picture_bytes_peak = 0;
+  std::size_t pose_bytes = 0;      ///< decoded poses of the segment that is played
   std::vector<std::string> notes;  ///< sentences for the user, such as a decoder that fell back
 };
 
@@ -143,6 +148,10 @@ class Prefetcher {
   /// kInvalid.
   Status set_loop(bool loop, std::uint64_t begin = 0, std::uint64_t end = 0);
 
+  /// From here on only frames that `n` divides are fetched, and those that playback starts or jumps
+  /// to: each stands for the ones between it and the next, which are decoded only where others
+  /// refer to them. Frames that are in the ring stay. Requires n >= 1.
+  void set_every(std::uint64_t n);
   /// Other bounds than the PrefetchOptions'. What is there already stays until it has gone by.
   void set_limits(std::size_t ring_bytes, std::size_t packet_bytes);
 

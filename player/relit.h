@@ -527,6 +527,7 @@ typedef struct relit_statistics {
   int32_t half_size;        ///< the light map is composited at half its size
   int32_t light_map_every;  ///< nth display frame
   int32_t threads;
+  uint64_t pose_bytes;  ///< decoded poses of the segment that is played
 } relit_statistics;
 
 RELIT_API relit_result relit_get_statistics(relit_player* player,

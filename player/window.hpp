@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "container/base/result.hpp"
-#include "player/clip_reader.hpp"
+#include "player/camera.hpp"
 #include "player/light.hpp"
+#include "player/look.hpp"
 #include "player/player.hpp"
-#include "player/scene_view.hpp"
 #include "player/source.hpp"
 
 namespace relit::player {
@@ -28,7 +28,8 @@ struct WindowOptions {
   double start_s = 0;
   double speed = 1;
 
-  ViewOptions view;
+  LookOptions look;
+  OrbitCamera camera;
   PlayerOptions player;  ///< its name, clip, interrupt and log are set by the window
 
   int width = 960;

@@ -32,15 +32,17 @@ void WindowSession::act(const Action& action) {
   if (const Status done = change(action); !done) say(done.error().message, true);
 }
 
+// What needs nothing to play.
 Status WindowSession::change(const Action& action) {
-  const int way = action.amount < 0 ? -1 : 1;
-  const double duration_s = player_->playback().duration_s();
   switch (action.kind) {
     case ActionKind::kQuit:
       requests_.quit = true;
       return {};
     case ActionKind::kEscape:
-      if (keys_ || statistics_) {
+      if (opening() && ready()) {
+        cancel_opening();
+        say("opening cancelled");
+      } else if (keys_ || statistics_) {
         keys_ = statistics_ = false;
       } else {
         requests_.escape = true;
@@ -49,11 +51,20 @@ Status WindowSession::change(const Action& action) {
     case ActionKind::kFullscreen:
       requests_.fullscreen = true;
       return {};
-    case ActionKind::kScreenshot:
-      requests_.screenshot = true;
-      return {};
     case ActionKind::kKeysPanel:
       keys_ = !keys_;
+      return {};
+    default:
+      return ready() ? change_player(action) : Status();
+  }
+}
+
+Status WindowSession::change_player(const Action& action) {
+  const int way = action.amount < 0 ? -1 : 1;
+  const double duration_s = player_->playback().duration_s();
+  switch (action.kind) {
+    case ActionKind::kScreenshot:
+      requests_.screenshot = true;
       return {};
     case ActionKind::kStatisticsPanel:
       statistics_ = !statistics_;
@@ -90,9 +101,9 @@ Status WindowSession::change(const Action& action) {
       return change_light(way);
     case ActionKind::kClip:
       return change_clip(way);
-    case ActionKind::kLayersBy:
-    case ActionKind::kLayersTo:
-      return change_layers(action);
+    case ActionKind::kPlanesBy:
+    case ActionKind::kPlanesTo:
+      return change_planes(action);
     case ActionKind::kPath:
       return change_path(way);
     case ActionKind::kQualityBy:
@@ -106,15 +117,16 @@ Status WindowSession::change(const Action& action) {
     case ActionKind::kZoom:
       move_camera(action);
       return {};
+    default:
+      return {};
   }
-  return {};
 }
 
 void WindowSession::move_camera(const Action& action) {
   const auto& low = clip().bounds_min;
   const auto& high = clip().bounds_max;
   const glm::vec3 from(low[0], low[1], low[2]), to(high[0], high[1], high[2]);
-  const double fitting = fitting_distance(camera_, from, to, aspect());
+  const double fitting = fitting_distance(camera_, from, to, size_.aspect());
   if (camera_.distance <= 0) camera_.distance = fitting;
   switch (action.kind) {
     case ActionKind::kOrbit:
@@ -127,7 +139,7 @@ void WindowSession::move_camera(const Action& action) {
       camera_.distance = std::clamp(camera_.distance * action.amount, 0.02 * fitting, 50 * fitting);
       break;
     default:
-      camera_ = options_.view.camera;
+      camera_ = options_.camera;
       say("camera reset");
       break;
   }
@@ -154,7 +166,7 @@ Status WindowSession::change_light(int way) {
     return {};
   }
   const std::size_t next = around(light_, way, lights_.size());
-  RELIT_TRY(use_light(*player_, lights_[next]));
+  RELIT_TRY(player_->set_light(lights_[next]));
   light_ = next;
   light_turn_rad_ = 0;
   RELIT_TRY(player_->turn_light(0));
@@ -199,20 +211,17 @@ Status WindowSession::change_quality(int way) {
   return {};
 }
 
-Status WindowSession::change_layers(const Action& action) {
-  const container::ModelRecord* model = player_->model_of(player_->moment().clip);
-  int count = 0;
-  for (const container::LayerRecord& layer : player_->contents().layers)
-    count += model != nullptr && layer.model_id == model->id ? 1 : 0;
-  int wanted = layers_ < 0 ? count : std::min(layers_, count);
-  if (action.kind == ActionKind::kLayersTo) {
+Status WindowSession::change_planes(const Action& action) {
+  const int count = planes_of_clip();
+  int wanted = planes_ < 0 ? count : std::min(planes_, count);
+  if (action.kind == ActionKind::kPlanesTo) {
     wanted = action.amount == 0 ? count : static_cast<int>(action.amount);
   } else {
     wanted += action.amount < 0 ? -1 : 1;
   }
   wanted = std::clamp(wanted, 1, std::max(count, 1));
-  RELIT_TRY(player_->set_layers(wanted == count ? -1 : wanted));
-  layers_ = wanted == count ? -1 : wanted;
+  planes_ = wanted == count ? -1 : wanted;
+  player_->set_planes(planes_);
   changed_ = true;
   say(planes_text());
   return {};

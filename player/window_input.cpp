@@ -76,8 +76,8 @@ const std::vector<KeyHelp>& key_help() {
       {"backspace", "normal speed"},
       {"C   shift+C", "next, previous clip"},
       {nullptr, "Speed and accuracy"},
-      {"page up, down", "layers of planes: one more, less"},
-      {"1 to 9, 0", "so many layers, all"},
+      {"page up, down", "planes: one more, one less"},
+      {"1 to 9, 0", "so many planes, all"},
       {"P   shift+P", "composite path"},
       {"V   shift+V", "quality"},
       {nullptr, "Window"},
@@ -106,9 +106,9 @@ void InputMap::key(Key key, Modifiers modifiers, std::vector<Action>& out) {
     case Key::kEnd:
       return out.push_back({ActionKind::kSeekTo, 1});
     case Key::kPageUp:
-      return out.push_back({ActionKind::kLayersBy, 1});
+      return out.push_back({ActionKind::kPlanesBy, 1});
     case Key::kPageDown:
-      return out.push_back({ActionKind::kLayersBy, -1});
+      return out.push_back({ActionKind::kPlanesBy, -1});
     case Key::kF1:
       return out.push_back({ActionKind::kKeysPanel});
     case Key::kF2:
@@ -133,7 +133,7 @@ void InputMap::letter(char32_t letter, Modifiers modifiers, bool repeat, std::ve
 void InputMap::typed(std::string_view utf8, std::vector<Action>& out) {
   for (const char character : utf8) {
     if (character >= '0' && character <= '9')
-      out.push_back({ActionKind::kLayersTo, static_cast<double>(character - '0')});
+      out.push_back({ActionKind::kPlanesTo, static_cast<double>(character - '0')});
     for (const TypedBinding& binding : kTyped)
       if (binding.character == character) out.push_back(binding.action);
   }

@@ -41,8 +41,8 @@ enum class ActionKind {
   kExposureBy,  ///< amount: stops
   kLight,       ///< amount: -1 or 1, to the one before or the next
   kClip,        ///< likewise
-  kLayersBy,    ///< amount: -1 or 1
-  kLayersTo,    ///< amount: the first 1..9 layers of planes; 0: all
+  kPlanesBy,    ///< amount: -1 or 1
+  kPlanesTo,    ///< amount: the first 1..9 planes; 0: all
   kPath,        ///< the next composite path
   kQualityBy,   ///< amount: -1 or 1, to the one before or the next
   kKeysPanel,

@@ -37,6 +37,7 @@ struct WindowStatistics {
   std::string path;     ///< the composite path that runs
   std::string why;      ///< and why
   std::string quality;  ///< what the governor has decided, in words
+  std::string planes;   ///< composited ones, likewise
   double pictures_per_s = 0;
   double target_per_s = 60;
   double clip_per_s = 0;  ///< frames of the clip a second

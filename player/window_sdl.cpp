@@ -244,8 +244,8 @@ int Window::ui_scale(int window_height, int drawable_height) const {
 Status Window::show() {
   const double now = now_s();
   if (const Status updated = session_->update(now); !updated) {
-    // Without GL nothing can be shown; anything else is told, and what is there stays.
-    if (updated.error().code == ErrorCode::kEnvironment) return updated;
+    // Without GL or a clip nothing can be shown; anything else is told, and what is there stays.
+    if (!session_->ready() || updated.error().code == ErrorCode::kEnvironment) return updated;
     session_->say(updated.error().message, true);
   }
   update_pointer(now);
@@ -264,13 +264,18 @@ Status Window::show() {
     SDL_WaitEventTimeout(nullptr, 50);
     return {};
   }
-  RELIT_TRY(session_->draw(width_px_, height_px_));
+  if (session_->ready()) {
+    RELIT_TRY(session_->draw(width_px_, height_px_));
+  } else {
+    device_->gl().ClearColor(0.1f, 0.1f, 0.1f, 1);
+    device_->gl().Clear(GL_COLOR_BUFFER_BIT);
+  }
   draw_overlay_model(now);
   RELIT_TRY(overlay_->draw(canvas_));
   const double before_swap = now_s();
   SDL_GL_SwapWindow(window_.get());
   statistics_.stages[4] = {"present", 1e3 * (now_s() - before_swap)};
-  count_picture(now_s());
+  if (session_->ready()) count_picture(now_s());
   if (session_->title() != shown_title_) {
     shown_title_ = session_->title();
     SDL_SetWindowTitle(window_.get(), (shown_title_ + " – relit").c_str());

@@ -105,6 +105,7 @@ void write_playback(Column& column, const OverlayModel& model) {
   column.row("path", s.path);
   if (!s.why.empty()) column.row("", s.why, kDim);
   column.row("quality", s.quality);
+  column.row("planes", s.planes);
   std::snprintf(text.data(), text.size(), "%llu new, %llu repeated, %llu late",
                 static_cast<unsigned long long>(s.shown),
                 static_cast<unsigned long long>(s.repeated),

@@ -1,48 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Counts what operator new gives out, on all threads. libavcodec and zstd allocate with malloc,
-// which does not count.
 #include "player/prefetcher.hpp"
 
-#include <atomic>
-#include <cstdlib>
-#include <new>
-
+#include "tests/allocations/counter.hpp"
 #include "tests/player/prefetch_clip.hpp"
-
-namespace {
-
-std::atomic<bool> counting{false};
-std::atomic<std::uint64_t> allocations{0};
-
-void* allocate(std::size_t bytes, std::size_t alignment) {
-  if (counting) ++allocations;
-  const std::size_t rounded = (std::max<std::size_t>(bytes, 1) + alignment - 1) & ~(alignment - 1);
-  return alignment <= alignof(std::max_align_t) ? std::malloc(rounded)
-                                                : std::aligned_alloc(alignment, rounded);
-}
-
-void* must_allocate(std::size_t bytes, std::size_t alignment) {
-  void* memory = allocate(bytes, alignment);
-  if (memory == nullptr) throw std::bad_alloc();
-  return memory;
-}
-
-}  // namespace
-
-void* operator new(std::size_t n) { return must_allocate(n, alignof(std::max_align_t)); }
-void* operator new(std::size_t n, std::align_val_t a) {
-  return must_allocate(n, static_cast<std::size_t>(a));
-}
-void* operator new(std::size_t n, const std::nothrow_t&) noexcept {
-  return allocate(n, alignof(std::max_align_t));
-}
-void* operator new(std::size_t n, std::align_val_t a, const std::nothrow_t&) noexcept {
-  return allocate(n, static_cast<std::size_t>(a));
-}
-void operator delete(void* p) noexcept { std::free(p); }
-void operator delete(void* p, std::size_t) noexcept { std::free(p); }
-void operator delete(void* p, std::align_val_t) noexcept { std::free(p); }
-void operator delete(void* p, std::size_t, std::align_val_t) noexcept { std::free(p); }
 
 using namespace relit;
 using namespace relit::player;
@@ -55,17 +15,14 @@ std::uint64_t allocations_of_a_lap(Prefetcher& clip, int laps) {
   const std::uint64_t count = clip.clip().frame_count;
   std::uint64_t frames = 0;
   for (int lap = 0; lap < laps; ++lap) {
-    if (lap + 1 == laps) {
-      allocations = 0;
-      counting = true;
-    }
+    if (lap + 1 == laps) relit::test::count_allocations();
     for (std::uint64_t k = 0; k < count; ++k) {
       clip.want(k);
       const auto came = clip.wait(k, kPatience_s);
       if (came && *came && clip.frame(k) != nullptr) ++frames;
     }
   }
-  counting = false;
+  const std::uint64_t allocations = relit::test::counted_allocations();
   CHECK(frames == count * static_cast<std::uint64_t>(laps));
   return allocations;
 }
@@ -73,10 +30,9 @@ std::uint64_t allocations_of_a_lap(Prefetcher& clip, int laps) {
 }  // namespace
 
 TEST_CASE("the counter counts") {
-  counting = true;
+  relit::test::count_allocations();
   auto something = std::make_unique<int>(1);
-  counting = false;
-  CHECK(allocations > 0);
+  CHECK(relit::test::counted_allocations() > 0);
   CHECK(something != nullptr);
 }
 

@@ -94,10 +94,11 @@ inline constexpr float kLight[12] = {2.6f, 2.4f, 2.2f, 0.9f, 0.8f, 0.7f,
 
 /// A context that is current on this thread while the object lives.
 struct ApiContext {
+  gles::OffscreenKind kind;
   std::unique_ptr<gles::OffscreenContext> context;
   gles::GetProcAddress find;
 
-  explicit ApiContext(gles::OffscreenKind kind) {
+  explicit ApiContext(gles::OffscreenKind wanted) : kind(wanted) {
     auto made = gles::OffscreenContext::create(kind);
     if (!made) return;
     context = std::move(*made);

@@ -70,7 +70,7 @@ TEST_CASE("ctrl with C, Q and W quits, and other letters do nothing with it") {
   CHECK(in.take().empty());
 }
 
-TEST_CASE("typed characters step, set speed, exposure and layers on any keyboard") {
+TEST_CASE("typed characters step, set speed, exposure and planes on any keyboard") {
   Input in;
   in.map.typed(".,+-=[]{}<>?", in.actions);
   const std::vector<Action> actions = in.take();
@@ -90,10 +90,10 @@ TEST_CASE("typed characters step, set speed, exposure and layers on any keyboard
   CHECK(actions[11].kind == ActionKind::kKeysPanel);
   in.map.typed("9", in.actions);
   Action action = in.only();
-  CHECK((action.kind == ActionKind::kLayersTo && action.amount == 9));
+  CHECK((action.kind == ActionKind::kPlanesTo && action.amount == 9));
   in.map.typed("0é", in.actions);
   action = in.only();
-  CHECK((action.kind == ActionKind::kLayersTo && action.amount == 0));
+  CHECK((action.kind == ActionKind::kPlanesTo && action.amount == 0));
 }
 
 TEST_CASE("keys that are no characters") {
@@ -108,8 +108,8 @@ TEST_CASE("keys that are no characters") {
         Case{Key::kBackspace, ActionKind::kSpeedReset, 0},
         Case{Key::kLeft, ActionKind::kSeekBy, -1}, Case{Key::kRight, ActionKind::kSeekBy, 1},
         Case{Key::kHome, ActionKind::kSeekTo, 0}, Case{Key::kEnd, ActionKind::kSeekTo, 1},
-        Case{Key::kPageUp, ActionKind::kLayersBy, 1},
-        Case{Key::kPageDown, ActionKind::kLayersBy, -1}, Case{Key::kF1, ActionKind::kKeysPanel, 0},
+        Case{Key::kPageUp, ActionKind::kPlanesBy, 1},
+        Case{Key::kPageDown, ActionKind::kPlanesBy, -1}, Case{Key::kF1, ActionKind::kKeysPanel, 0},
         Case{Key::kF2, ActionKind::kStatisticsPanel, 0}}) {
     in.map.key(c.key, kNone, in.actions);
     const Action action = in.only();

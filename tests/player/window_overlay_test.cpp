@@ -40,7 +40,8 @@ WindowStatistics busy_statistics() {
   s.why =
       "texture: measured cpu 2.00 ms, texture 3.40 ms, fused 1.20 ms a frame, at 5000 covered "
       "pixels";
-  s.quality = "auto, 1.00, 27 of 27 planes";
+  s.quality = "auto, 1.00";
+  s.planes = "27 of 27";
   s.stages[0] = {"decode", 3.2};
   s.stages[1] = {"draw", 40};
   s.memory[0] = {"ring", 3u << 20, 4u << 20};

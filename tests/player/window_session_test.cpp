@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "player/window_session.hpp"
 
+#include <sys/stat.h>
+
 #include <chrono>
+#include <csignal>
 #include <fstream>
 #include <thread>
 
@@ -38,7 +41,16 @@ class Session {
     auto session = WindowSession::create(options, [this] { return make_device(); });
     if (!session) return Unexpected{session.error()};
     self = std::move(*session);
-    return {};
+    return await();
+  }
+  // Until nothing is being opened any more.
+  Status await() {
+    for (int i = 0; i < 3000; ++i) {
+      RELIT_TRY(self->update(now_s));
+      if (!self->opening()) return {};
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    return fail(ErrorCode::kIo, "it does not open");
   }
 
   [[nodiscard]] Result<std::unique_ptr<gles::Device>> make_device() const {
@@ -97,11 +109,18 @@ TEST_CASE("a session says what each action has changed") {
   CHECK(session.act(ActionKind::kLight, 1) == "light: studio_soft (1 of 2)");
   CHECK(session.act(ActionKind::kLight, -1) == "light: studio_soft (2 of 2)");
   CHECK(session.act(ActionKind::kClip, 1) == "clip: walk, the only one");
-  CHECK(session.act(ActionKind::kLayersBy, -1) == "12 of 27 planes, 2 of 3 layers");
-  CHECK(session.act(ActionKind::kLayersTo, 1) == "3 of 27 planes, 1 of 3 layers");
-  CHECK(session.act(ActionKind::kLayersBy, -1) == "3 of 27 planes, 1 of 3 layers");
-  CHECK(session.act(ActionKind::kLayersTo, 9) == "27 of 27 planes, 3 of 3 layers");
-  CHECK(session.act(ActionKind::kLayersTo, 0) == "27 of 27 planes, 3 of 3 layers");
+  CHECK(session.act(ActionKind::kPlanesBy, -1) == "26 of 27 planes");
+  CHECK(session.act(ActionKind::kPlanesTo, 1) == "1 of 27 planes");
+  CHECK(session.act(ActionKind::kPlanesBy, -1) == "1 of 27 planes");
+  CHECK(session.act(ActionKind::kPlanesTo, 9) == "9 of 27 planes");
+  CHECK(session.act(ActionKind::kPlanesBy, 1) == "10 of 27 planes");
+  session.settle();
+  session.act(ActionKind::kStatisticsPanel);
+  session.model();
+  // Of those, the exposure leaves out what it cannot show.
+  CHECK(session.statistics.planes.find(" of 27, 10 asked for") != std::string::npos);
+  session.act(ActionKind::kStatisticsPanel);
+  CHECK(session.act(ActionKind::kPlanesTo, 0) == "27 of 27 planes");
   for (const char* path : {"path: cpu", "path: texture", "path: fused", "path: auto"})
     CHECK(session.act(ActionKind::kPath, 1) == path);
   CHECK(session.act(ActionKind::kPath, -1) == "path: fused");
@@ -154,6 +173,7 @@ TEST_CASE("a session plays what is dropped, and keeps what it has where that fai
         write("none.json", "{"), folder.file("missing.relit"), folder.file("missing.exr"),
         write("letter.txt", "dear reader")}) {
     session.self->drop(bad);
+    REQUIRE(session.await());
     INFO(bad << ": " << session.message());
     CHECK(session.model().message_is_error);
     CHECK(session.message().find(bad) != std::string::npos);
@@ -161,15 +181,97 @@ TEST_CASE("a session plays what is dropped, and keeps what it has where that fai
     session.settle();
   }
   session.self->drop(write("sky.json", R"({"sh": [[1, 1, 1]]})"));
+  REQUIRE(session.await());
   CHECK(session.message() == "light: sky (2 of 2)");
   std::filesystem::copy_file(shipped_clip(), folder.file("other.relit"));
   session.act(ActionKind::kStatisticsPanel);
   session.self->drop(folder.file("other.relit"));
+  REQUIRE(session.await());
   CHECK(session.self->title() == "other.relit");
   session.settle();
   // Under the light that was chosen.
   session.model();
   CHECK(session.statistics.light == "sky (2 of 2)");
+}
+
+TEST_CASE("what is being opened holds nothing up, says so, and can be cancelled") {
+  const Folder folder;
+  std::signal(SIGPIPE, SIG_IGN);
+  const auto make_pipe = [&](const char* name) {
+    REQUIRE(::mkfifo(folder.file(name).c_str(), 0600) == 0);
+    return folder.file(name);
+  };
+  // Somebody who writes when the test says so: until then opening waits, in the system.
+  const auto feed = [](const std::string& pipe, std::size_t bytes) {
+    auto file = read_bytes(shipped_clip());
+    file.resize(std::min(bytes, file.size()));
+    std::ofstream(pipe, std::ios::binary)
+        .write(reinterpret_cast<const char*>(file.data()), static_cast<std::streamsize>(bytes));
+  };
+  Session session;
+  REQUIRE(session.opened);
+  session.settle();
+  const std::string stalled = make_pipe("pipe.relit");
+  session.self->drop(stalled);
+  CHECK(session.self->opening());
+  const double started_s = session.model().time_s;
+  for (int i = 0; i < 20; ++i) {
+    session.now_s += 0.02;
+    REQUIRE(session.self->update(session.now_s));
+    session.settle();
+  }
+  // Playback goes on, keys are heard.
+  CHECK(session.model().time_s != started_s);
+  CHECK(session.message().rfind("opening pipe.relit…", 0) == 0);
+  CHECK(session.self->has_overlay());
+  CHECK(session.act(ActionKind::kExposureBy, 0.25) == "exposure +0.25");
+  session.act(ActionKind::kEscape);
+  CHECK_FALSE(session.self->opening());
+  CHECK_FALSE(session.self->take_requests().escape);
+  CHECK(session.message() == "opening cancelled");
+  feed(stalled, 1000);  // lets the thread that was left behind go
+  // What breaks off is told, and what was there stays.
+  const std::string broken = make_pipe("broken.relit");
+  session.self->drop(broken);
+  feed(broken, 1000);
+  REQUIRE(session.await());
+  CHECK(session.model().message_is_error);
+  CHECK(session.self->title() == "mannequin.relit");
+  const std::string whole = make_pipe("whole.relit");
+  session.self->drop(whole);
+  std::thread feeder([&] { feed(whole, std::filesystem::file_size(shipped_clip())); });
+  REQUIRE(session.await());
+  CHECK(session.self->title() == "whole.relit");
+  session.settle();
+  session.self.reset();  // closes the pipe, whatever of it has not been read
+  feeder.join();
+}
+
+TEST_CASE("before the first source is open only what needs none is done") {
+  const Folder folder;
+  const std::string pipe = folder.file("pipe.relit");
+  REQUIRE(::mkfifo(pipe.c_str(), 0600) == 0);
+  Session session;
+  session.options.source = pipe;
+  auto made = WindowSession::create(session.options, [&session] { return session.make_device(); });
+  REQUIRE(made);
+  session.self = std::move(*made);
+  REQUIRE(session.self->update(session.now_s));
+  CHECK_FALSE(session.self->ready());
+  for (const ActionKind kind : {ActionKind::kPause, ActionKind::kSeekTo, ActionKind::kPlanesTo,
+                                ActionKind::kLight, ActionKind::kZoom, ActionKind::kScreenshot})
+    session.self->act({kind, 1});
+  CHECK_FALSE(session.self->take_requests().screenshot);
+  CHECK(session.message().rfind("opening pipe.relit…", 0) == 0);
+  session.self->act({ActionKind::kKeysPanel});
+  CHECK(session.model().keys);
+  session.self->act({ActionKind::kEscape});
+  CHECK_FALSE(session.self->take_requests().escape);
+  session.self->act({ActionKind::kEscape});
+  CHECK(session.self->take_requests().escape);
+  CHECK_FALSE(session.self->loss().any());
+  session.self.reset();
+  std::ofstream(pipe).put(' ');
 }
 
 TEST_CASE("a session draws, and asks the window for what is the window's") {
@@ -218,10 +320,10 @@ TEST_CASE("a session plays sequences, and refuses clips, looks and files that ar
   CHECK(no_clip.opened.error().message.find("walk") != std::string::npos);
   for (const auto& [what, adapt] :
        std::vector<std::pair<const char*, std::function<void(WindowOptions&)>>>{
-           {"--exposure", [](WindowOptions& o) { o.view.exposure = "bright"; }},
-           {"--tone-map", [](WindowOptions& o) { o.view.tone_map = "sepia"; }},
-           {"--background", [](WindowOptions& o) { o.view.background = "#12345"; }},
-           {"--background", [](WindowOptions& o) { o.view.background = "#12345g"; }},
+           {"--exposure", [](WindowOptions& o) { o.look.exposure = "bright"; }},
+           {"--tone-map", [](WindowOptions& o) { o.look.tone_map = "sepia"; }},
+           {"--background", [](WindowOptions& o) { o.look.background = "#12345"; }},
+           {"--background", [](WindowOptions& o) { o.look.background = "#12345g"; }},
            {"nowhere", [](WindowOptions& o) { o.source = "/nowhere/at.relit"; }}}) {
     const Session refused(adapt);
     REQUIRE_FALSE(refused.opened);
