@@ -57,6 +57,9 @@ glm::mat3 ray_matrix(const View& view, float rotation_rad) {
 
 Result<BackgroundRenderer> BackgroundRenderer::create(const Device& device) {
   RELIT_TRY(device.ready("creating a background"));
+  // Programs are made when they are first needed; the state that a call leaves is promised all the
+  // same.
+  const StateGuard guard(device);
   BackgroundRenderer renderer;
   renderer.device_ = &device;
   renderer.half_float_ = device.caps().half_float_texture && device.caps().half_float_linear;
