@@ -92,9 +92,7 @@ struct Attached {
   ApiPlayer player;
   explicit Attached(ApiContext& context, relit_path path) : player(mannequin(), options(path)) {
     REQUIRE(player.result == RELIT_OK);
-    relit_gl_options gl = context.options();
-    // Drivers give more than is asked for, and the command then asks for no more than this either.
-    if (context.kind == gles::OffscreenKind::kEglEs2) gl.es_version = 2;
+    const relit_gl_options gl = context.options();
     const relit_result attached = relit_gl_attach(player, &gl);
     INFO(player.error());
     REQUIRE(attached == RELIT_OK);

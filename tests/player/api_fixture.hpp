@@ -107,6 +107,8 @@ struct ApiContext {
   [[nodiscard]] relit_gl_options options() {
     relit_gl_options options;
     REQUIRE(relit_gl_options_default(&options, sizeof options) == RELIT_OK);
+    // Drivers give more than is asked for.
+    if (kind == gles::OffscreenKind::kEglEs2) options.es_version = 2;
     options.user = this;
     options.get_proc_address = [](void* user, const char* name) {
       return static_cast<ApiContext*>(user)->find(name);

@@ -270,7 +270,6 @@ TEST_CASE("before the first source is open only what needs none is done") {
   CHECK(session.self->take_requests().escape);
   CHECK_FALSE(session.self->loss().any());
   session.self.reset();
-  std::ofstream(pipe).put(' ');
 }
 
 TEST_CASE("a session draws, and asks the window for what is the window's") {
