@@ -28,7 +28,8 @@ void State::share_out_threads(const PrefetchOptions& options) {
   }
   const auto& rate = demuxer.clip().tick_rate;
   const std::uint64_t half_a_second = std::clamp<std::uint64_t>(
-      rate.num / (2 * std::max<std::uint64_t>(rate.den, 1)), 1, demuxer.clip().frame_count);
+      static_cast<std::uint64_t>(rate.num / (2 * std::max<std::int64_t>(rate.den, 1))), 1,
+      demuxer.clip().frame_count);
   const std::uint64_t ahead = std::min<std::uint64_t>(ring_limit / frame_bytes, ring.size());
   const auto workers = static_cast<std::size_t>(pool->threads());
   std::size_t lanes = 1, threads = static_cast<std::size_t>(std::max(options.threads, 1));
