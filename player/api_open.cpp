@@ -152,11 +152,10 @@ relit_result relit_pool_create(const relit_pool_options* options, relit_pool** p
     if (options != nullptr) RELIT_TRY(read_struct("relit_pool_options", options, chosen));
     if (chosen.threads < 0 || chosen.threads > 64)
       return fail(ErrorCode::kInvalid, "threads must be 0 to 64");
-    const int processors = static_cast<int>(std::thread::hardware_concurrency());
     auto made = std::make_unique<relit_pool>();
     RELIT_ASSIGN(
         made->pool,
-        WorkerPool::create(chosen.threads > 0 ? chosen.threads : std::clamp(processors, 1, 64)));
+        WorkerPool::create(chosen.threads > 0 ? chosen.threads : WorkerPool::default_threads()));
     *pool = made.release();
     return {};
   });

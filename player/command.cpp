@@ -27,6 +27,10 @@ int report_in(const std::string& file, const Error& error) {
   return report({error.code, file + ": " + error.message});
 }
 
+void warn(const std::string& sentence) {
+  std::fprintf(stderr, "relit: warning: %s\n", sentence.c_str());
+}
+
 void add_source_options(CLI::App& command, SourceArguments& arguments, const std::string& help) {
   command.add_option("source", arguments.name, help)->required();
   command
@@ -40,16 +44,13 @@ Result<std::unique_ptr<container::ByteSource>> open_source(const SourceArguments
   SourceOptions options;
   options.http_headers = arguments.http_headers;
   options.sparing = sparing;
-  options.warn = [](const std::string& sentence) {
-    std::fprintf(stderr, "relit: warning: %s\n", sentence.c_str());
-  };
+  options.warn = &warn;
   return open_source(arguments.name, options);
 }
 
 Result<ClipReader> open_clip(const SourceArguments& arguments, const ClipOptions& options) {
   RELIT_ASSIGN(auto bytes, open_source(arguments, options.spares_bytes()));
-  return ClipReader::open(std::move(bytes),
-                          arguments.name == "-" ? "standard input" : arguments.name, options);
+  return ClipReader::open(std::move(bytes), source_name(arguments.name), options);
 }
 
 int report_loss(const PlaybackLoss& loss) {
@@ -77,8 +78,7 @@ Result<LoadedLight> load_light(const LightArguments& arguments, int order) {
   options.rotate_rad = arguments.rotate_deg * std::numbers::pi / 180;
   options.window = arguments.window;
   RELIT_ASSIGN(LoadedLight light, load_light(arguments.path, options));
-  for (const std::string& warning : light.warnings)
-    std::fprintf(stderr, "relit: warning: %s\n", warning.c_str());
+  for (const std::string& warning : light.warnings) warn(warning);
   const double least =
       *std::min_element(light.minimum_radiance.begin(), light.minimum_radiance.end());
   const double mean = light.light.sh.front()[1] * decoders::kBand0;

@@ -30,6 +30,9 @@ int report(const Error& error);
 /// The same, with the name of the file it is about in front.
 int report_in(const std::string& file, const Error& error);
 
+/// To standard error.
+void warn(const std::string& sentence);
+
 /// SRC and --http-header.
 struct SourceArguments {
   std::string name;

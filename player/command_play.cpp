@@ -47,9 +47,7 @@ Result<WindowOptions> window_options(const Arguments& arguments) {
   WindowOptions window = arguments.window;
   window.source = arguments.source.name;
   window.reading.http_headers = arguments.source.http_headers;
-  window.reading.warn = [](const std::string& sentence) {
-    std::fprintf(stderr, "relit: warning: %s\n", sentence.c_str());
-  };
+  window.reading.warn = &warn;
   for (std::size_t from = 0; from < arguments.clips.size();) {
     const std::size_t comma = std::min(arguments.clips.find(',', from), arguments.clips.size());
     window.clips.push_back(arguments.clips.substr(from, comma - from));

@@ -115,7 +115,7 @@ class Frames {
 
   Status open_player(const Arguments& arguments, CompositePath path) {
     PlayerOptions options;
-    options.name = arguments.source.name == "-" ? "standard input" : arguments.source.name;
+    options.name = source_name(arguments.source.name);
     options.clip = arguments.clip;
     options.layers = arguments.layers, options.threads = arguments.threads;
     options.interpolate = false;
@@ -129,7 +129,7 @@ class Frames {
       return PlayerFrames{range.first, range.last};
     };
     options.log = [](LogLevel level, const std::string& sentence) {
-      if (level != LogLevel::kInfo) std::fprintf(stderr, "relit: warning: %s\n", sentence.c_str());
+      if (level != LogLevel::kInfo) warn(sentence);
     };
     RELIT_ASSIGN(auto source,
                  open_source(arguments.source, options.sparing || arguments.layers >= 0));

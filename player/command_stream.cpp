@@ -148,14 +148,11 @@ Result<Stream> Stream::open(const Arguments& arguments) {
   reading.http_headers = arguments.source.http_headers;
   reading.sparing = arguments.layers >= 0;
   reading.interrupt = Interrupt::poll(interrupt);
-  reading.warn = [](const std::string& sentence) {
-    std::fprintf(stderr, "relit: warning: %s\n", sentence.c_str());
-  };
+  reading.warn = &warn;
   const std::string& name = arguments.source.name;
   RELIT_ASSIGN(auto bytes, open_source(name, reading));
-  RELIT_ASSIGN(auto demuxer,
-               ClipDemuxer::open(std::move(bytes), name == "-" ? "standard input" : name,
-                                 {arguments.clip, reading.sparing, interrupt}));
+  RELIT_ASSIGN(auto demuxer, ClipDemuxer::open(std::move(bytes), source_name(name),
+                                               {arguments.clip, reading.sparing, interrupt}));
   RELIT_ASSIGN(stream.plan_, plan_within(arguments, demuxer));
   PrefetchOptions options;
   options.ring_bytes = static_cast<std::size_t>(arguments.ring_bytes);
@@ -279,7 +276,6 @@ void Stream::observe() {
 }
 
 void Stream::print_summary() const {
-  if (isatty(STDERR_FILENO) != 0) std::fprintf(stderr, "\r\033[K");
   const PrefetchStats stats = clip_->stats();
   std::printf("%llu frames in %.2f s: %.1f frames/s; first picture after %.0f ms\n",
               static_cast<unsigned long long>(frames_), play_s_,

@@ -66,7 +66,6 @@ PrefetchOptions Player::State::prefetch_options(std::size_t layer_count, bool ro
 }
 
 MemoryWishes Player::State::wishes() const {
-  const int processors = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   MemoryWishes wishes;
   wishes.clip = options.clip;
   wishes.layers = layers;
@@ -74,7 +73,7 @@ MemoryWishes Player::State::wishes() const {
   wishes.drawing = options.drawing;
   wishes.threads = options.pool          ? options.pool->threads()
                    : options.threads > 0 ? options.threads
-                                         : std::min(processors, 64);
+                                         : WorkerPool::default_threads();
   return wishes;
 }
 
@@ -155,6 +154,12 @@ void Player::State::jumped() {
   seeking = true;
 }
 
+// Within what plays, whose light goes with it.
+void Player::State::jumped_within() {
+  light_time_s = playback->now().time_s;
+  jumped();
+}
+
 Status Player::play_clip(std::size_t clip, double cross_fade_s) {
   if (!seekable() && clip < contents().clips.size() && clip != state_->primary->clip())
     return fail(ErrorCode::kUnsupported,
@@ -199,22 +204,19 @@ void Player::set_loop(LoopMode mode) {
 
 Status Player::seek(double time_s) {
   RELIT_TRY(state_->playback->seek(time_s));
-  state_->light_time_s = state_->playback->now().time_s;
-  state_->jumped();
+  state_->jumped_within();
   return {};
 }
 
 Status Player::seek_frame(std::uint64_t frame) {
   RELIT_TRY(state_->playback->seek_frame(frame));
-  state_->light_time_s = state_->playback->now().time_s;
-  state_->jumped();
+  state_->jumped_within();
   return {};
 }
 
 Status Player::step(std::int64_t frames) {
   RELIT_TRY(state_->playback->step(frames));
-  state_->light_time_s = state_->playback->now().time_s;
-  state_->jumped();
+  state_->jumped_within();
   return {};
 }
 

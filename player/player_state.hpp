@@ -51,6 +51,7 @@ struct Player::State final : FrameTimes {
     if (options.log) options.log(level, text);
   }
   void jumped();
+  void jumped_within();
 
   // player_voices.cpp
   Status assign_voices(const Moment& now);

@@ -281,8 +281,7 @@ Result<bool> Player::State::show_frame(std::uint64_t frame, double timeout_s) {
     if (!sought && moment.ready) return prefetcher.frame(frame) != nullptr;
   }
   RELIT_TRY(sought);
-  light_time_s = playback->now().time_s;
-  jumped();
+  jumped_within();
   return wait(std::max(0.0, timeout_s - seconds_since(begin)));
 }
 

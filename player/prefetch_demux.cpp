@@ -154,14 +154,18 @@ void State::after_event() {
   wake();
 }
 
+/// Tells the demuxer which layers are wanted, where that has changed.
+void State::pass_choice_on() {
+  if (!std::exchange(wanted_changed, false)) return;
+  if (planes)
+    demuxer.want_layers(wanted_layers);
+  else
+    demuxer.want_poses_alone();
+}
+
 void State::take_segment() {
   closed_no = last_no;
-  if (std::exchange(wanted_changed, false)) {
-    if (planes)
-      demuxer.want_layers(wanted_layers);
-    else
-      demuxer.want_poses_alone();
-  }
+  pass_choice_on();
   const container::SegmentRecord* segment = demuxer.segment();
   if (segment == nullptr) return;
   timeline.add(*segment);

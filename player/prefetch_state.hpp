@@ -122,6 +122,7 @@ struct Prefetcher::State {
   // prefetch_tracks.cpp
   Status open_tracks(const PrefetchOptions& options, std::shared_ptr<WorkerPool> workers);
   void share_out_threads(const PrefetchOptions& options);
+  [[nodiscard]] Status check_choice(std::span<const std::uint8_t> chosen) const;
   Result<decoders::TrackDecoder> open_decoder(const Track& track) const;
   bool run_strand(Lane& lane);
   bool step(Lane& lane);
@@ -143,6 +144,7 @@ struct Prefetcher::State {
   void go_to_start(std::unique_lock<std::mutex>& lock);
   void begin_lap(std::unique_lock<std::mutex>& lock);
   void read_one(std::unique_lock<std::mutex>& lock);
+  void pass_choice_on();
   void take_segment();
   void take_chunk(container::ChunkRecord& chunk);
   void resolve_tick();

@@ -56,6 +56,13 @@ void State::share_out_threads(const PrefetchOptions& options) {
   }
 }
 
+Status State::check_choice(std::span<const std::uint8_t> chosen) const {
+  const std::size_t count = demuxer.layers().size();
+  if (chosen.size() == count) return {};
+  return fail(ErrorCode::kInvalid, "one choice for each of the " + std::to_string(count) +
+                                       " layers is needed, got " + std::to_string(chosen.size()));
+}
+
 Status State::open_tracks(const PrefetchOptions& options, std::shared_ptr<WorkerPool> workers) {
   pool = std::move(workers);
   memory = options.memory ? options.memory : std::make_shared<decoders::PictureMemory>();
@@ -81,11 +88,7 @@ Status State::open_tracks(const PrefetchOptions& options, std::shared_ptr<Worker
     if (!layers[i].has_exponents) continue;
     add_video(decoders::exponent_format(layers[i]), static_cast<int>(i), true);
   }
-  if (!options.layers.empty() && options.layers.size() != layers.size()) {
-    return fail(ErrorCode::kInvalid, "one choice for each of the " + std::to_string(layers.size()) +
-                                         " layers is needed, got " +
-                                         std::to_string(options.layers.size()));
-  }
+  if (!options.layers.empty()) RELIT_TRY(check_choice(options.layers));
   share_out_threads(options);
   return {};
 }

@@ -43,11 +43,7 @@ Result<std::unique_ptr<Prefetcher>> Prefetcher::create(ClipDemuxer demuxer,
     std::vector<std::uint8_t> layers = options.layers;
     if (layers.empty()) layers.assign(s.demuxer.layers().size(), 1);
     RELIT_TRY(prefetcher->set_layers(layers));
-    if (s.planes)
-      s.demuxer.want_layers(layers);
-    else
-      s.demuxer.want_poses_alone();
-    s.wanted_changed = false;
+    s.pass_choice_on();
     RELIT_TRY(prefetcher->set_loop(options.loop, options.loop_begin, options.loop_end));
     try {
       s.thread = std::thread([&s] { s.run(); });
@@ -223,11 +219,7 @@ std::uint32_t Prefetcher::ticks_of(std::uint64_t index) const {
 
 Status Prefetcher::set_layers(std::span<const std::uint8_t> wanted, bool now) {
   State& s = *state_;
-  const std::size_t count = s.demuxer.layers().size();
-  if (wanted.size() != count) {
-    return fail(ErrorCode::kInvalid, "one choice for each of the " + std::to_string(count) +
-                                         " layers is needed, got " + std::to_string(wanted.size()));
-  }
+  RELIT_TRY(s.check_choice(wanted));
   return catch_out_of_memory("choosing layers", [&]() -> Status {
     const std::lock_guard lock(s.mutex);
     auto by_track = std::make_shared<std::vector<std::uint8_t>>(s.tracks.size(), 1);

@@ -106,7 +106,7 @@ Result<std::optional<WholeSegment>> RewriteSource::next() {
 
 Result<RewriteSource> open_rewrite(const std::string& name) {
   RELIT_ASSIGN(auto bytes, open_source(name));
-  return RewriteSource::open(std::move(bytes), name == "-" ? "standard input" : name);
+  return RewriteSource::open(std::move(bytes), source_name(name));
 }
 
 }  // namespace relit::player

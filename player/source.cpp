@@ -15,4 +15,8 @@ Result<std::unique_ptr<container::ByteSource>> open_source(const std::string& so
   return std::unique_ptr<container::ByteSource>(std::move(file));
 }
 
+std::string source_name(const std::string& source) {
+  return source == "-" ? "standard input" : source;
+}
+
 }  // namespace relit::player

@@ -35,4 +35,7 @@ struct SourceOptions {
 [[nodiscard]] Result<std::unique_ptr<container::ByteSource>> open_source(
     const std::string& source, const SourceOptions& options = {});
 
+/// What messages call it: "standard input" for "-".
+[[nodiscard]] std::string source_name(const std::string& source);
+
 }  // namespace relit::player

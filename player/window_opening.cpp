@@ -1,33 +1,19 @@
 // SPDX-License-Identifier: MIT
 // How a session opens sources and lights while it goes on.
-#include <charconv>
 #include <cstdio>
 #include <filesystem>
 
+#include "player/video_tracks.hpp"
 #include "player/window_session.hpp"
 
 namespace relit::player {
 namespace {
 
 std::string name_of(const std::string& source) {
-  if (source == "-") return "standard input";
+  if (source == "-") return source_name(source);
   std::string name = source.substr(0, source.find_first_of("?#"));
   name = std::filesystem::path(name).filename().string();
   return name.empty() ? source : name;
-}
-
-// By name, or by number.
-Result<std::size_t> find_clip(const container::FileContents& contents, const std::string& wanted) {
-  std::size_t number = contents.clips.size();
-  const char* end = wanted.data() + wanted.size();
-  const auto [rest, error] = std::from_chars(wanted.data(), end, number);
-  std::string names;
-  for (std::size_t i = 0; i < contents.clips.size(); ++i) {
-    if (contents.clips[i].name == wanted) return i;
-    names += (i == 0 ? "" : ", ") + contents.clips[i].name;
-  }
-  if (error == std::errc() && rest == end && number < contents.clips.size()) return number;
-  return fail(ErrorCode::kNotFound, "no clip \"" + wanted + "\"; there are: " + names);
 }
 
 // Counts what is read, for whoever waits.
@@ -58,7 +44,7 @@ class CountedSource final : public container::ByteSource {
 PlayerOptions WindowSession::player_options(const std::string& source,
                                             const Opening& opening) const {
   PlayerOptions player = options_.player;
-  player.name = source == "-" ? "standard input" : source;
+  player.name = source_name(source);
   player.clip = opening.as_asked && options_.clips.size() == 1 ? options_.clips.front() : "";
   player.path = path_;
   player.governor.quality = quality_;
@@ -153,7 +139,10 @@ Status WindowSession::start(Player& player, bool as_asked) const {
     std::vector<SequenceItem> items;
     for (const std::string& wanted : options_.clips) {
       SequenceItem item;
-      RELIT_ASSIGN(item.clip, find_clip(player.contents(), wanted));
+      const auto& file = player.contents();
+      RELIT_ASSIGN(const container::ClipRecord* clip,
+                   find_clip(file, wanted, source_name(options_.source)));
+      item.clip = static_cast<std::size_t>(clip - file.clips.data());
       item.cross_fade_s = options_.cross_fade_s;
       items.push_back(item);
     }

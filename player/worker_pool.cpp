@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "player/worker_pool.hpp"
 
+#include <algorithm>
 #include <cassert>
 #include <string>
 #include <system_error>
@@ -9,6 +10,10 @@
 #include "container/base/out_of_memory.hpp"
 
 namespace relit::player {
+
+int WorkerPool::default_threads() {
+  return static_cast<int>(std::clamp(std::thread::hardware_concurrency(), 1u, 64u));
+}
 
 Result<std::shared_ptr<WorkerPool>> WorkerPool::create(int threads) {
   constexpr int kMostThreads = 64;

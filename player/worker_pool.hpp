@@ -28,6 +28,8 @@ class WorkerPool {
   WorkerPool(const WorkerPool&) = delete;
   WorkerPool& operator=(const WorkerPool&) = delete;
 
+  /// One a processor, as far as create() takes them.
+  [[nodiscard]] static int default_threads();
   [[nodiscard]] int threads() const { return static_cast<int>(threads_.size()); }
 
  private:

@@ -77,6 +77,15 @@ double largest(const std::vector<float>& values) {
   return most;
 }
 
+Picture mean_of(const Picture& a, const Picture& b) {
+  Picture mean = a;
+  for (std::size_t i = 0; i < mean.light.size(); ++i)
+    mean.light[i] = 0.5f * (a.light[i] + b.light[i]);
+  for (std::size_t i = 0; i < mean.vertices.size(); ++i)
+    mean.vertices[i] = 0.5f * (a.vertices[i] + b.vertices[i]);
+  return mean;
+}
+
 }  // namespace
 
 TEST_CASE("api: without GL, light maps and vertices come as numbers") {
@@ -240,11 +249,7 @@ TEST_CASE("api: between frames, light and vertices are blended, or not") {
   REQUIRE(relit_seek(player, 6.5 * frame_s) == RELIT_OK);
   waited(player);
   const Picture between = picture_of(player);
-  Picture mean = at6;
-  for (std::size_t i = 0; i < mean.light.size(); ++i)
-    mean.light[i] = 0.5f * (at6.light[i] + at7.light[i]);
-  for (std::size_t i = 0; i < mean.vertices.size(); ++i)
-    mean.vertices[i] = 0.5f * (at6.vertices[i] + at7.vertices[i]);
+  const Picture mean = mean_of(at6, at7);
   // A few roundings of single precision, relative to the largest value.
   check_near(between.light, mean.light, 1e-6 * largest(mean.light));
   // A joint that turns by a between two frames puts points at distance r off the straight line
@@ -281,11 +286,7 @@ TEST_CASE("api: a cross-fade blends two clips, and ends in the second") {
   moment_of(player, static_cast<std::int64_t>(0.5 * fade_s * 1e9));
   CHECK(waited(player).clip == 1);
   const Picture middle = picture_of(player);
-  Picture mean = going;
-  for (std::size_t i = 0; i < mean.light.size(); ++i)
-    mean.light[i] = 0.5f * (going.light[i] + coming.light[i]);
-  for (std::size_t i = 0; i < mean.vertices.size(); ++i)
-    mean.vertices[i] = 0.5f * (going.vertices[i] + coming.vertices[i]);
+  const Picture mean = mean_of(going, coming);
   // Weights of a half are exact; what is left are roundings of single precision.
   check_near(middle.light, mean.light, 1e-6 * largest(mean.light));
   check_near(middle.vertices, mean.vertices, 1e-6 * largest(mean.vertices));

@@ -19,6 +19,13 @@ namespace relit::player::test {
 
 using Bytes = std::vector<std::uint8_t>;
 
+/// Frames are not shown before all their planes have come.
+inline PrefetchOptions patient() {
+  PrefetchOptions options;
+  options.impatient = false;
+  return options;
+}
+
 /// Bytes that can only be read forward, as from a pipe.
 class PipeSource final : public container::ByteSource {
  public:

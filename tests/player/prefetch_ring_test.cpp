@@ -14,12 +14,6 @@ using namespace relit::player::test;
 
 namespace {
 
-PrefetchOptions patient() {
-  PrefetchOptions options;
-  options.impatient = false;
-  return options;
-}
-
 // Without being printed where they differ.
 bool same(const Bytes& a, const Bytes& b) { return a == b; }
 

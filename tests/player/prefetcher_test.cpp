@@ -12,12 +12,6 @@ using namespace relit::player::test;
 
 namespace {
 
-PrefetchOptions patient() {
-  PrefetchOptions options;
-  options.impatient = false;
-  return options;
-}
-
 Bytes small_clip() { return coded_file({"mpeg4", true, true, true}); }
 
 Bytes damaged_clip() {

@@ -57,8 +57,7 @@ TEST_CASE("two prefetchers play one file at once, and share what is static") {
   REQUIRE(second);
   CHECK(second->statics() == first->statics());
   auto pool = WorkerPool::create(2);
-  PrefetchOptions options;
-  options.impatient = false;
+  PrefetchOptions options = patient();
   auto a = Prefetcher::create(std::move(*first), *pool, options);
   options.first_frame = 30;
   auto b = Prefetcher::create(std::move(*second), *pool, options);
