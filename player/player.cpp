@@ -68,7 +68,8 @@ PrefetchOptions Player::State::prefetch_options(std::size_t layer_count, bool ro
 MemoryWishes Player::State::wishes() const {
   MemoryWishes wishes;
   wishes.clip = options.clip;
-  wishes.layers = layers;
+  // What set_layers() leaves out may come back.
+  wishes.layers = options.layers;
   wishes.path = options.path;
   wishes.drawing = options.drawing;
   wishes.threads = options.pool          ? options.pool->threads()

@@ -319,6 +319,29 @@ TEST_CASE("api: a sequence plays clip after clip") {
   CHECK(at(2 * second_s + first_s).ended == 1);
 }
 
+TEST_CASE("api: layers that are left out for a while stay within what a budget has planned") {
+  relit_open_options options = default_options();
+  options.memory_budget_bytes = std::uint64_t{1} << 40;
+  const ApiPlayer player(two_clip_file(), options), whole(two_clip_file(), options);
+  REQUIRE(player.result == RELIT_OK);
+  const auto shown = [](const ApiPlayer& p) {
+    REQUIRE(relit_set_light_sh(p, kLight, 4) == RELIT_OK);
+    REQUIRE(relit_seek_frame(p, 0) == RELIT_OK);
+    waited(p);
+    return light_map(p);
+  };
+  REQUIRE(relit_play_clip(whole, 1, 0) == RELIT_OK);
+  const std::vector<float> all = shown(whole);
+  for (const int layers : {1, 0}) {
+    INFO(layers);
+    REQUIRE(relit_set_layers(player, layers) == RELIT_OK);
+    REQUIRE(relit_play_clip(player, 1, 0) == RELIT_OK);
+    CHECK(shown(player) != all);
+    REQUIRE(relit_set_layers(player, -1) == RELIT_OK);
+    CHECK(shown(player) == all);
+  }
+}
+
 TEST_CASE("api: a sequence keeps to the budget, or is refused and nothing changes") {
   // What one clip takes, and two, of one thread each.
   const auto planned = [](std::uint64_t budget, bool sequence) {
