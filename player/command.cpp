@@ -31,12 +31,12 @@ void warn(const std::string& sentence) {
   std::fprintf(stderr, "relit: warning: %s\n", sentence.c_str());
 }
 
-void add_source_options(CLI::App& command, SourceArguments& arguments, const std::string& help) {
-  command.add_option("source", arguments.name, help)->required();
+void add_source_options(Options command, SourceArguments& arguments, const std::string& help) {
+  command.add("source", arguments.name, help).required();
   command
-      .add_option("--http-header", arguments.http_headers,
-                  "\"Name: value\", sent with every request of http(s); repeatable")
-      ->expected(1);
+      .add("--http-header", arguments.http_headers,
+           "\"Name: value\", sent with every request of http(s); repeatable")
+      .expected(1, 1);
 }
 
 Result<std::unique_ptr<container::ByteSource>> open_source(const SourceArguments& arguments,
@@ -64,12 +64,10 @@ int report_loss(const PlaybackLoss& loss) {
   return kWithLosses;
 }
 
-void add_light_options(CLI::App& command, LightArguments& arguments) {
-  command
-      .add_option("--rotate-light", arguments.rotate_deg,
-                  "turn the light about +Y, degrees added to φ")
-      ->capture_default_str();
-  command.add_flag("--light-window", arguments.window, "window the bands against ringing");
+void add_light_options(Options command, LightArguments& arguments) {
+  command.add("--rotate-light", arguments.rotate_deg, "turn the light about +Y, degrees added to φ")
+      .shows_default();
+  command.flag("--light-window", arguments.window, "window the bands against ringing");
 }
 
 Result<LoadedLight> load_light(const LightArguments& arguments, int order) {
@@ -92,18 +90,15 @@ Result<LoadedLight> load_light(const LightArguments& arguments, int order) {
   return light;
 }
 
-void add_look_options(CLI::App& command, LookOptions& look, std::string& camera) {
-  command.add_option("--camera", camera, "orbit:AZIMUTH,ELEVATION[,DISTANCE], degrees and metres");
-  command.add_option("--exposure", look.exposure, "auto, or stops: radiance × 2^stops")
-      ->capture_default_str();
-  command.add_option("--tone-map", look.tone_map, "neutral, filmic or linear")
-      ->capture_default_str();
-  command.add_option("--background", look.background, "light, sh, none (transparent) or #rrggbb")
-      ->capture_default_str();
+void add_look_options(Options command, LookOptions& look, std::string& camera) {
+  command.add("--camera", camera, "orbit:AZIMUTH,ELEVATION[,DISTANCE], degrees and metres");
+  command.add("--exposure", look.exposure, "auto, or stops: radiance × 2^stops").shows_default();
+  command.add("--tone-map", look.tone_map, "neutral, filmic or linear").shows_default();
+  command.add("--background", look.background, "light, sh, none (transparent) or #rrggbb")
+      .shows_default();
   command
-      .add_option("--background-blur", look.background_blur_deg,
-                  "soft focus of the background, degrees")
-      ->check(CLI::Range(0.0, 90.0));
+      .add("--background-blur", look.background_blur_deg, "soft focus of the background, degrees")
+      .range(0.0, 90.0);
 }
 
 Result<FrameRange> parse_frames(const std::string& text, const char* option, std::uint64_t count) {

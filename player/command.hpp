@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "container/base/result.hpp"
 #include "player/clip_reader.hpp"
+#include "player/command_line.hpp"
 #include "player/light.hpp"
 #include "player/look.hpp"
 #include "player/source.hpp"
@@ -39,7 +38,7 @@ struct SourceArguments {
   std::vector<std::string> http_headers;
 };
 /// `help` describes SRC.
-void add_source_options(CLI::App& command, SourceArguments& arguments, const std::string& help);
+void add_source_options(Options command, SourceArguments& arguments, const std::string& help);
 /// Opens SRC as the user named it; warnings go to standard error.
 [[nodiscard]] Result<std::unique_ptr<container::ByteSource>> open_source(
     const SourceArguments& arguments, bool sparing);
@@ -55,12 +54,12 @@ struct LightArguments {
   double rotate_deg = 0;
   bool window = false;
 };
-void add_light_options(CLI::App& command, LightArguments& arguments);
+void add_light_options(Options command, LightArguments& arguments);
 /// Loads the light and warns of negative radiance.
 [[nodiscard]] Result<LoadedLight> load_light(const LightArguments& arguments, int order);
 
 /// --camera, --exposure, --tone-map, --background and --background-blur.
-void add_look_options(CLI::App& command, LookOptions& look, std::string& camera);
+void add_look_options(Options command, LookOptions& look, std::string& camera);
 
 /// "7", "0-99": frames first..last of a clip of `count` frames.
 struct FrameRange {
@@ -70,20 +69,19 @@ struct FrameRange {
 [[nodiscard]] Result<FrameRange> parse_frames(const std::string& text, const char* option,
                                               std::uint64_t count);
 
-/// A subcommand: adds itself to the application; the function runs it after parsing.
-using Command = std::function<int()>;
-Command add_info(CLI::App& app);
-Command add_plan(CLI::App& app);
-Command add_dump(CLI::App& app);
-Command add_light(CLI::App& app);
-Command add_render(CLI::App& app);
-Command add_play(CLI::App& app);
-Command add_stream(CLI::App& app);
-Command add_validate(CLI::App& app);
-Command add_recover(CLI::App& app);
-Command add_remux(CLI::App& app);
-Command add_concat(CLI::App& app);
-Command add_export(CLI::App& app);
-Command add_import(CLI::App& app);
+/// Each adds its command to the command line.
+void add_info(CommandLine& line);
+void add_plan(CommandLine& line);
+void add_dump(CommandLine& line);
+void add_light(CommandLine& line);
+void add_render(CommandLine& line);
+void add_play(CommandLine& line);
+void add_stream(CommandLine& line);
+void add_validate(CommandLine& line);
+void add_recover(CommandLine& line);
+void add_remux(CommandLine& line);
+void add_concat(CommandLine& line);
+void add_export(CommandLine& line);
+void add_import(CommandLine& line);
 
 }  // namespace relit::player

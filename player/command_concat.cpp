@@ -33,19 +33,17 @@ int run(const Arguments& arguments) {
 
 }  // namespace
 
-Command add_concat(CLI::App& app) {
-  CLI::App* command = app.add_subcommand(
-      "concat", "join files of one character into one file with all their clips");
+void add_concat(CommandLine& line) {
+  Options command =
+      line.add("concat", "join files of one character into one file with all their clips");
   const auto arguments = std::make_shared<Arguments>();
-  command->add_option("sources", arguments->sources, "paths, - or http(s)://")
-      ->required()
-      ->expected(2, 1024);
-  command->add_option("-o,--output", arguments->output, "the new file")->required();
-  command->footer(
+  command.add("sources", arguments->sources, "paths, - or http(s)://").required().expected(2, 1024);
+  command.add("-o,--output", arguments->output, "the new file").required();
+  command.footer(
       "Meshes, materials, images and skeleton must be the same; nothing is encoded again.\n"
       "Clips whose name is taken get \" 2\", \" 3\", ...\n"
       "Example:\n  relit concat walk.relit turn.relit walk.relit -o scene.relit");
-  return [arguments] { return run(*arguments); };
+  command.runs([arguments] { return run(*arguments); });
 }
 
 }  // namespace relit::player

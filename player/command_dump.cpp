@@ -75,24 +75,22 @@ int run(const Arguments& arguments) {
 
 }  // namespace
 
-Command add_dump(CLI::App& app) {
-  CLI::App* command =
-      app.add_subcommand("dump", "write decoded transfer coefficients as NumPy arrays");
+void add_dump(CommandLine& line) {
+  Options command = line.add("dump", "write decoded transfer coefficients as NumPy arrays");
   const auto arguments = std::make_shared<Arguments>();
-  add_source_options(*command, arguments->source, "path, - or http(s)://");
-  auto* frame = command->add_option("--frame", arguments->frame,
-                                    "one frame: float32 [coefficients][3][H][W]");
-  command->add_option("--frames", arguments->frames, "A-B: float32 [frames][coefficients][3][H][W]")
-      ->excludes(frame);
-  command->add_option("-o,--output", arguments->output, "the .npy file");
-  command->add_option("--mask", arguments->mask,
-                      "also write which texels the mesh owns: uint8 [H][W]");
-  command->add_option("--clip", arguments->clip, "by name or number");
-  command->add_option("--layers", arguments->layers,
-                      "only the first so many layers; what they lack is zero");
-  command->add_option("--threads", arguments->threads, "of each decoder")->check(CLI::Range(1, 64));
-  command->footer("Example:\n  relit dump man.relit --frames 0-99 -o man.npy --mask mask.npy");
-  return [arguments] { return run(*arguments); };
+  add_source_options(command, arguments->source, "path, - or http(s)://");
+  Option frame =
+      command.add("--frame", arguments->frame, "one frame: float32 [coefficients][3][H][W]");
+  command.add("--frames", arguments->frames, "A-B: float32 [frames][coefficients][3][H][W]")
+      .excludes(frame);
+  command.add("-o,--output", arguments->output, "the .npy file");
+  command.add("--mask", arguments->mask, "also write which texels the mesh owns: uint8 [H][W]");
+  command.add("--clip", arguments->clip, "by name or number");
+  command.add("--layers", arguments->layers,
+              "only the first so many layers; what they lack is zero");
+  command.add("--threads", arguments->threads, "of each decoder").range(1, 64);
+  command.footer("Example:\n  relit dump man.relit --frames 0-99 -o man.npy --mask mask.npy");
+  command.runs([arguments] { return run(*arguments); });
 }
 
 }  // namespace relit::player

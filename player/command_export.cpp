@@ -149,17 +149,16 @@ int run(const Arguments& arguments) {
 
 }  // namespace
 
-Command add_export(CLI::App& app) {
-  CLI::App* command =
-      app.add_subcommand("export", "write the video tracks of a clip as a Matroska file");
+void add_export(CommandLine& line) {
+  Options command = line.add("export", "write the video tracks of a clip as a Matroska file");
   const auto arguments = std::make_shared<Arguments>();
-  command->add_option("source", arguments->source, "path, - or http(s)://")->required();
-  command->add_option("-o,--output", arguments->output, "the .mkv file")->required();
-  command->add_option("--clip", arguments->clip, "by name or number");
-  command->footer(
+  command.add("source", arguments->source, "path, - or http(s)://").required();
+  command.add("-o,--output", arguments->output, "the .mkv file").required();
+  command.add("--clip", arguments->clip, "by name or number");
+  command.footer(
       "Every stream's tag RELIT_TRACK is the number of its track; packets are copied as they are.\n"
       "Example:\n  relit export man.relit -o man.mkv && ffprobe man.mkv");
-  return [arguments] { return run(*arguments); };
+  command.runs([arguments] { return run(*arguments); });
 }
 
 }  // namespace relit::player

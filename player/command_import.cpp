@@ -211,21 +211,18 @@ int run(const Arguments& arguments) {
 
 }  // namespace
 
-Command add_import(CLI::App& app) {
-  CLI::App* command =
-      app.add_subcommand("import", "put the video tracks of a Matroska file back into a clip");
+void add_import(CommandLine& line) {
+  Options command = line.add("import", "put the video tracks of a Matroska file back into a clip");
   const auto arguments = std::make_shared<Arguments>();
-  command->add_option("source", arguments->source, "the .relit file: path, - or http(s)://")
-      ->required();
-  command->add_option("matroska", arguments->matroska, "as `relit export` wrote it, or remuxed")
-      ->required();
-  command->add_option("-o,--output", arguments->output, "the new .relit file")->required();
-  command->footer(
+  command.add("source", arguments->source, "the .relit file: path, - or http(s)://").required();
+  command.add("matroska", arguments->matroska, "as `relit export` wrote it, or remuxed").required();
+  command.add("-o,--output", arguments->output, "the new .relit file").required();
+  command.footer(
       "Tracks that the Matroska file lacks keep their packets. Segments stay where they are: "
       "every\n"
       "one has to begin with a key frame. Records that this version does not know are left out.\n"
       "Example:\n  relit import man.relit man.mkv -o new.relit");
-  return [arguments] { return run(*arguments); };
+  command.runs([arguments] { return run(*arguments); });
 }
 
 }  // namespace relit::player

@@ -88,12 +88,12 @@ int run(const Arguments& arguments) {
 
 }  // namespace
 
-Command add_info(CLI::App& app) {
-  CLI::App* command = app.add_subcommand("info", "say what a file holds");
+void add_info(CommandLine& line) {
+  Options command = line.add("info", "say what a file holds");
   const auto arguments = std::make_shared<Arguments>();
-  add_source_options(*command, arguments->source, "path, - or http(s)://");
-  command->add_flag("--json", arguments->json, "as JSON, to standard output");
-  return [arguments] { return run(*arguments); };
+  add_source_options(command, arguments->source, "path, - or http(s)://");
+  command.flag("--json", arguments->json, "as JSON, to standard output");
+  command.runs([arguments] { return run(*arguments); });
 }
 
 }  // namespace relit::player

@@ -57,33 +57,30 @@ int run(const Arguments& arguments) {
 
 }  // namespace
 
-Command add_light(CLI::App& app) {
-  CLI::App* command =
-      app.add_subcommand("light", "project an environment map to spherical harmonics, for devices");
+void add_light(CommandLine& line) {
+  Options command =
+      line.add("light", "project an environment map to spherical harmonics, for devices");
   const auto arguments = std::make_shared<Arguments>();
   command
-      ->add_option("environment", arguments->environments,
-                   ".hdr or .exr (equirectangular), or .json; several with --times")
-      ->required();
-  command->add_option("-o,--output", arguments->output, "the .json file")->required();
-  command->add_option("--order", arguments->order, "0 to 3")
-      ->check(CLI::Range(0, 3))
-      ->capture_default_str();
-  add_light_options(*command, arguments->light);
-  auto* times =
-      command->add_option("--times", arguments->times_s, "T,T,…: seconds at which each light holds")
-          ->delimiter(',');
-  command->add_flag("--loop", arguments->loop, "from the last light to the first again")
-      ->needs(times);
-  command->add_option("--period", arguments->period_s, "seconds after which the first comes again")
-      ->needs(times);
-  command->add_flag("--step", arguments->step, "from light to light at once, without blending")
-      ->needs(times);
-  command->footer(
+      .add("environment", arguments->environments,
+           ".hdr or .exr (equirectangular), or .json; several with --times")
+      .required();
+  command.add("-o,--output", arguments->output, "the .json file").required();
+  command.add("--order", arguments->order, "0 to 3").range(0, 3).shows_default();
+  add_light_options(command, arguments->light);
+  Option times =
+      command.add("--times", arguments->times_s, "T,T,…: seconds at which each light holds")
+          .delimiter(',');
+  command.flag("--loop", arguments->loop, "from the last light to the first again").needs(times);
+  command.add("--period", arguments->period_s, "seconds after which the first comes again")
+      .needs(times);
+  command.flag("--step", arguments->step, "from light to light at once, without blending")
+      .needs(times);
+  command.footer(
       "Examples:\n"
       "  relit light sky.hdr -o sky.json --rotate-light 90 --light-window\n"
       "  relit light dawn.hdr noon.hdr dusk.hdr --times 0,4,8 -o day.json");
-  return [arguments] { return run(*arguments); };
+  command.runs([arguments] { return run(*arguments); });
 }
 
 }  // namespace relit::player

@@ -154,38 +154,34 @@ int run(Arguments arguments) {
 
 }  // namespace
 
-Command add_plan(CLI::App& app) {
-  CLI::App* command = app.add_subcommand("plan", "say what memory playing a file takes");
+void add_plan(CommandLine& line) {
+  Options command = line.add("plan", "say what memory playing a file takes");
   const auto arguments = std::make_shared<Arguments>();
-  add_source_options(*command, arguments->source, "path, - or http(s)://");
-  command->add_option("--memory-budget", arguments->budget,
-                      "bytes of heap and GPU together, such as 32MiB; as much as the machine has");
-  command->add_option("--clip", arguments->wishes.clip, "by name or number");
-  command->add_option("--with", arguments->wishes.others,
-                      "another clip of a sequence, by name or number; repeatable. Two of them play "
-                      "at once in a cross-fade");
-  command->add_option("--layers", arguments->wishes.layers, "only the first so many layers");
-  command->add_option("--threads", arguments->wishes.threads, "decode workers")
-      ->check(CLI::Range(1, 64));
-  command->add_option("--ring", arguments->wishes.ring_frames,
-                      "frames decoded ahead (default: a quarter of a second)");
-  command->add_option("--composite", arguments->path, "auto, cpu, texture or fused")
-      ->capture_default_str();
-  command->add_option("--size", arguments->size, "of the picture")->capture_default_str();
-  command->add_option("--samples", arguments->samples, "of the picture's pixels: 1, 4 or 16")
-      ->check(CLI::IsMember({1, 4, 16}))
-      ->capture_default_str();
-  command
-      ->add_option("--background-side", arguments->background,
-                   "of the background's cube map; 0: none")
-      ->check(CLI::Range(0, 1024))
-      ->capture_default_str();
-  command->add_flag("--headless", arguments->headless, "nothing is drawn, as in relit stream");
-  command->add_flag("--json", arguments->json, "as JSON, to standard output");
-  command->footer(
+  add_source_options(command, arguments->source, "path, - or http(s)://");
+  command.add("--memory-budget", arguments->budget,
+              "bytes of heap and GPU together, such as 32MiB; as much as the machine has");
+  command.add("--clip", arguments->wishes.clip, "by name or number");
+  command.add("--with", arguments->wishes.others,
+              "another clip of a sequence, by name or number; repeatable. Two of them play "
+              "at once in a cross-fade");
+  command.add("--layers", arguments->wishes.layers, "only the first so many layers");
+  command.add("--threads", arguments->wishes.threads, "decode workers").range(1, 64);
+  command.add("--ring", arguments->wishes.ring_frames,
+              "frames decoded ahead (default: a quarter of a second)");
+  command.add("--composite", arguments->path, "auto, cpu, texture or fused").shows_default();
+  command.add("--size", arguments->size, "of the picture").shows_default();
+  command.add("--samples", arguments->samples, "of the picture's pixels: 1, 4 or 16")
+      .one_of({1, 4, 16})
+      .shows_default();
+  command.add("--background-side", arguments->background, "of the background's cube map; 0: none")
+      .range(0, 1024)
+      .shows_default();
+  command.flag("--headless", arguments->headless, "nothing is drawn, as in relit stream");
+  command.flag("--json", arguments->json, "as JSON, to standard output");
+  command.footer(
       "What does not fit is given up in this order: frames ahead, threads, the choice of composite "
       "path, the light map's precision, layers.\nExit status: 1 if no plan fits.");
-  return [arguments] { return run(*arguments); };
+  command.runs([arguments] { return run(*arguments); });
 }
 
 }  // namespace relit::player

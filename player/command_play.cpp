@@ -76,80 +76,71 @@ int run(const Arguments& arguments) {
   return report_loss(*loss);
 }
 
-void add_playback_options(CLI::App& command, Arguments& a) {
-  command.add_option("--clip", a.clips,
-                     "by name or number; several, with commas between, are a sequence");
+void add_playback_options(Options command, Arguments& a) {
+  command.add("--clip", a.clips, "by name or number; several, with commas between, are a sequence");
   command
-      .add_option("--cross-fade", a.window.cross_fade_s,
-                  "over which the clips of a sequence blend, and those that C takes, seconds")
-      ->check(CLI::Range(0.0, 3600.0));
-  command.add_option("--start", a.window.start_s, "begin at this time, seconds")
-      ->check(CLI::Range(0.0, 1e9));
-  command.add_option("--speed", a.window.speed, "1 is real time")
-      ->check(CLI::Range(0.01, Playback::kLargestSpeed))
-      ->capture_default_str();
-  CLI::Option* loop = command.add_flag("--loop", a.loop,
-                                       "begin again at the end; by default the "
-                                       "clip says whether");
-  command.add_flag("--no-loop", a.no_loop, "stand at the end")->excludes(loop);
-  command.add_flag("--no-interpolation", a.no_interpolation,
-                   "show frames as they are, and nothing in between");
+      .add("--cross-fade", a.window.cross_fade_s,
+           "over which the clips of a sequence blend, and those that C takes, seconds")
+      .range(0.0, 3600.0);
+  command.add("--start", a.window.start_s, "begin at this time, seconds").range(0.0, 1e9);
+  command.add("--speed", a.window.speed, "1 is real time")
+      .range(0.01, Playback::kLargestSpeed)
+      .shows_default();
+  Option loop = command.flag("--loop", a.loop,
+                             "begin again at the end; by default the "
+                             "clip says whether");
+  command.flag("--no-loop", a.no_loop, "stand at the end").excludes(loop);
+  command.flag("--no-interpolation", a.no_interpolation,
+               "show frames as they are, and nothing in between");
 }
 
-void add_cost_options(CLI::App& command, Arguments& a) {
+void add_cost_options(Options command, Arguments& a) {
   command
-      .add_option("--target-fps", a.window.player.governor.target_fps,
-                  "pictures a second that the quality is chosen for")
-      ->check(CLI::Range(1.0, 1000.0))
-      ->capture_default_str();
-  command.add_option("--quality", a.quality, "auto, or from 0 to 1")->capture_default_str();
-  command
-      .add_option("--composite", a.composite, "who adds the planes up: auto, cpu, texture or fused")
-      ->capture_default_str();
-  command.add_option("--layers", a.window.player.layers,
-                     "only the first so many layers: faster and less accurate");
-  command.add_option("--threads", a.window.player.threads, "that decode; 0: one a processor")
-      ->check(CLI::Range(0, 64))
-      ->capture_default_str();
-  command.add_option("--memory-budget", a.memory_budget,
-                     "bytes, or such as 32MiB: plans to fit, or refuses");
+      .add("--target-fps", a.window.player.governor.target_fps,
+           "pictures a second that the quality is chosen for")
+      .range(1.0, 1000.0)
+      .shows_default();
+  command.add("--quality", a.quality, "auto, or from 0 to 1").shows_default();
+  command.add("--composite", a.composite, "who adds the planes up: auto, cpu, texture or fused")
+      .shows_default();
+  command.add("--layers", a.window.player.layers,
+              "only the first so many layers: faster and less accurate");
+  command.add("--threads", a.window.player.threads, "that decode; 0: one a processor")
+      .range(0, 64)
+      .shows_default();
+  command.add("--memory-budget", a.memory_budget,
+              "bytes, or such as 32MiB: plans to fit, or refuses");
 }
 
 }  // namespace
 
-Command add_play(CLI::App& app) {
-  CLI::App* command = app.add_subcommand("play", "play a clip in a window");
+void add_play(CommandLine& line) {
+  Options command = line.add("play", "play a clip in a window");
   const auto a = std::make_shared<Arguments>();
-  add_source_options(*command, a->source, "path, - or http(s)://; a pipe cannot loop");
+  add_source_options(command, a->source, "path, - or http(s)://; a pipe cannot loop");
   command
-      ->add_option("--light", a->lights,
-                   ".hdr, .exr (equirectangular) or .json; several are taken in turn")
-      ->required();
-  add_light_options(*command, a->light);
+      .add("--light", a->lights, ".hdr, .exr (equirectangular) or .json; several are taken in turn")
+      .required();
+  add_light_options(command, a->light);
   command
-      ->add_option(
-          "--at", a->at,
-          "X,Y,Z: where the character stands in a light that varies with the place, metres")
-      ->delimiter(',')
-      ->expected(3);
-  add_look_options(*command, a->window.look, a->camera);
-  add_playback_options(*command, *a);
-  add_cost_options(*command, *a);
-  command->add_option("--width", a->window.width, "of the window")
-      ->check(CLI::Range(16, 16384))
-      ->capture_default_str();
-  command->add_option("--height", a->window.height, "of the window")
-      ->check(CLI::Range(16, 16384))
-      ->capture_default_str();
-  command->add_flag("--fullscreen", a->window.fullscreen, "begin in full screen");
+      .add("--at", a->at,
+           "X,Y,Z: where the character stands in a light that varies with the place, metres")
+      .delimiter(',')
+      .expected(3, 3);
+  add_look_options(command, a->window.look, a->camera);
+  add_playback_options(command, *a);
+  add_cost_options(command, *a);
+  command.add("--width", a->window.width, "of the window").range(16, 16384).shows_default();
+  command.add("--height", a->window.height, "of the window").range(16, 16384).shows_default();
+  command.flag("--fullscreen", a->window.fullscreen, "begin in full screen");
   command
-      ->add_option("--ui-scale", a->window.ui_scale,
-                   "pixels a point of what is written over the picture; 0: by the display")
-      ->check(CLI::Range(0, 4));
-  command->add_flag("--es2", a->window.es2, "take OpenGL ES 2");
-  command->add_option("--pictures", a->window.max_shown, "leave after so many pictures");
-  command->footer(window_help());
-  return [a] { return run(*a); };
+      .add("--ui-scale", a->window.ui_scale,
+           "pixels a point of what is written over the picture; 0: by the display")
+      .range(0, 4);
+  command.flag("--es2", a->window.es2, "take OpenGL ES 2");
+  command.add("--pictures", a->window.max_shown, "leave after so many pictures");
+  command.footer(window_help());
+  command.runs([a] { return run(*a); });
 }
 
 }  // namespace relit::player

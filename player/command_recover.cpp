@@ -99,14 +99,14 @@ int run(const Arguments& arguments) {
 
 }  // namespace
 
-Command add_recover(CLI::App& app) {
-  CLI::App* command = app.add_subcommand(
-      "recover", "write what is left of a damaged or cut file as a complete one");
+void add_recover(CommandLine& line) {
+  Options command =
+      line.add("recover", "write what is left of a damaged or cut file as a complete one");
   const auto arguments = std::make_shared<Arguments>();
-  command->add_option("source", arguments->source, "the damaged file")->required();
-  command->add_option("output", arguments->output, "the new file")->required();
-  command->add_flag("--json", arguments->json, "say what happened as JSON, to standard output");
-  command->footer(
+  command.add("source", arguments->source, "the damaged file").required();
+  command.add("output", arguments->output, "the new file").required();
+  command.flag("--json", arguments->json, "say what happened as JSON, to standard output");
+  command.footer(
       "Exit status: 0 everything was kept, 3 something was lost, 1 nothing usable, and no file is "
       "written.\n\n"
       "JSON: {\"clean\": bool, \"source_bytes\", \"damaged_bytes\", \"segments\" (written), "
@@ -115,7 +115,7 @@ Command add_recover(CLI::App& app) {
       "  \"tracks\": [{\"clip\": id, \"clip_name\", \"track\": id, \"what\": \"pose\" | \"layer "
       "ID\" | \"exponents of layer ID\", \"missing_frames\": [[first, last], ...]}]}\n"
       "missing_frames are the frames of the clip that the new file lacks in that track.");
-  return [arguments] { return run(*arguments); };
+  command.runs([arguments] { return run(*arguments); });
 }
 
 }  // namespace relit::player

@@ -54,40 +54,38 @@ int run(const Arguments& arguments) {
 
 }  // namespace
 
-Command add_remux(CLI::App& app) {
-  CLI::App* command =
-      app.add_subcommand("remux", "write parts of a file as a file of their own, as they are");
+void add_remux(CommandLine& line) {
+  Options command = line.add("remux", "write parts of a file as a file of their own, as they are");
   const auto arguments = std::make_shared<Arguments>();
-  command->add_option("source", arguments->source, "path, - or http(s)://")->required();
-  command->add_option("output", arguments->output, "the new file")->required();
+  command.add("source", arguments->source, "path, - or http(s)://").required();
+  command.add("output", arguments->output, "the new file").required();
   command
-      ->add_option("--clip", arguments->options.clips,
-                   "keep this clip, by name or number; may be repeated")
-      ->allow_extra_args(false);
-  auto* layers =
-      command->add_option("--layers", arguments->layers, "keep the first so many of each model");
-  command->add_option("--tracks", arguments->options.tracks, "keep these tracks: 1,2,5")
-      ->delimiter(',')
-      ->allow_extra_args(false);
-  auto* frames = command->add_option("--frames", arguments->frames, "A-B: keep these frames");
-  auto* from = command->add_option("--from", arguments->from, "keep what is shown from then on, s")
-                   ->check(CLI::NonNegativeNumber)
-                   ->excludes(frames);
-  auto* to = command->add_option("--to", arguments->to, "keep what is shown before, s")
-                 ->check(CLI::NonNegativeNumber)
-                 ->excludes(frames);
-  command->add_flag("--no-copies", arguments->no_copies,
-                    "do not store the static records a second time");
-  command->footer(
+      .add("--clip", arguments->options.clips, "keep this clip, by name or number; may be repeated")
+      .one_each();
+  Option layers =
+      command.add("--layers", arguments->layers, "keep the first so many of each model");
+  command.add("--tracks", arguments->options.tracks, "keep these tracks: 1,2,5")
+      .delimiter(',')
+      .one_each();
+  Option frames = command.add("--frames", arguments->frames, "A-B: keep these frames");
+  Option from = command.add("--from", arguments->from, "keep what is shown from then on, s")
+                    .not_negative()
+                    .excludes(frames);
+  Option to = command.add("--to", arguments->to, "keep what is shown before, s")
+                  .not_negative()
+                  .excludes(frames);
+  command.flag("--no-copies", arguments->no_copies,
+               "do not store the static records a second time");
+  command.footer(
       "Ranges reach out to segment borders, and start anew with frame 0. Nothing is encoded "
       "again.\n"
       "Example:\n  relit remux man.relit preview.relit --layers 1 --from 0.5 --to 1");
-  return [arguments, layers, from, to] {
-    arguments->has_layers = layers->count() > 0;
-    arguments->has_from = from->count() > 0;
-    arguments->has_to = to->count() > 0;
+  command.runs([arguments, layers, from, to] {
+    arguments->has_layers = layers.given();
+    arguments->has_from = from.given();
+    arguments->has_to = to.given();
     return run(*arguments);
-  };
+  });
 }
 
 }  // namespace relit::player

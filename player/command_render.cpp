@@ -278,48 +278,44 @@ constexpr const char* kExamples = R"(Examples:
 
 }  // namespace
 
-Command add_render(CLI::App& app) {
-  CLI::App* command = app.add_subcommand(
-      "render", "relight a clip: pictures, films, contact sheets or the light map itself");
+void add_render(CommandLine& line) {
+  Options command =
+      line.add("render", "relight a clip: pictures, films, contact sheets or the light map itself");
   const auto a = std::make_shared<Arguments>();
-  add_source_options(*command, a->source, "path, - or http(s)://");
-  command->add_option("--light", a->light.path, ".hdr, .exr (equirectangular) or .json")
-      ->required();
-  add_light_options(*command, a->light);
+  add_source_options(command, a->source, "path, - or http(s)://");
+  command.add("--light", a->light.path, ".hdr, .exr (equirectangular) or .json").required();
+  add_light_options(command, a->light);
   command
-      ->add_option("--at", a->position,
-                   "X,Y,Z: where the character stands among the probes of a light, metres")
-      ->delimiter(',')
-      ->expected(3);
-  command->add_option("-o,--output", a->output, ".png, .mp4, .webp, .gif; with --lightmap .npy")
-      ->required();
-  auto* frame = command->add_option("--frame", a->frame, "one frame");
-  auto* frames = command->add_option("--frames", a->frames, "A-B")->excludes(frame);
-  command->add_option("--time", a->time_s, "the frame shown at so many seconds")
-      ->excludes(frame)
-      ->excludes(frames)
-      ->check(CLI::NonNegativeNumber);
-  command->add_option("--clip", a->clip, "by name or number");
-  command->add_option("--size", a->size, "of the picture")->capture_default_str();
-  add_look_options(*command, a->look, a->camera);
-  command->add_option("--backend", a->backend, "egl, egl-es2, egl-es2-mediump, osmesa or cpu")
-      ->capture_default_str();
-  command->add_option("--composite", a->composite,
-                      "where planes are added up: auto, cpu, texture or fused; by default what the "
-                      "backend says");
-  command->add_option("--layers", a->layers,
-                      "only the first so many layers: faster and less accurate");
-  command->add_option("--threads", a->threads, "that decode; 0: one a processor")
-      ->check(CLI::Range(0, 64))
-      ->capture_default_str();
-  command->add_option("--samples", a->samples, "a pixel, against jagged edges: 1, 4 or 16")
-      ->check(CLI::IsMember({1, 4, 16}))
-      ->capture_default_str();
-  command->add_option("--sheet", a->sheet, "COLUMNSxROWS: a contact sheet of evenly spaced frames");
-  command->add_flag("--lightmap", a->lightmap,
-                    "write the composite, float32 [3][H][W], not clamped");
-  command->footer(kExamples);
-  return [a] { return run(*a); };
+      .add("--at", a->position,
+           "X,Y,Z: where the character stands among the probes of a light, metres")
+      .delimiter(',')
+      .expected(3, 3);
+  command.add("-o,--output", a->output, ".png, .mp4, .webp, .gif; with --lightmap .npy").required();
+  Option frame = command.add("--frame", a->frame, "one frame");
+  Option frames = command.add("--frames", a->frames, "A-B").excludes(frame);
+  command.add("--time", a->time_s, "the frame shown at so many seconds")
+      .excludes(frame)
+      .excludes(frames)
+      .not_negative();
+  command.add("--clip", a->clip, "by name or number");
+  command.add("--size", a->size, "of the picture").shows_default();
+  add_look_options(command, a->look, a->camera);
+  command.add("--backend", a->backend, "egl, egl-es2, egl-es2-mediump, osmesa or cpu")
+      .shows_default();
+  command.add("--composite", a->composite,
+              "where planes are added up: auto, cpu, texture or fused; by default what the "
+              "backend says");
+  command.add("--layers", a->layers, "only the first so many layers: faster and less accurate");
+  command.add("--threads", a->threads, "that decode; 0: one a processor")
+      .range(0, 64)
+      .shows_default();
+  command.add("--samples", a->samples, "a pixel, against jagged edges: 1, 4 or 16")
+      .one_of({1, 4, 16})
+      .shows_default();
+  command.add("--sheet", a->sheet, "COLUMNSxROWS: a contact sheet of evenly spaced frames");
+  command.flag("--lightmap", a->lightmap, "write the composite, float32 [3][H][W], not clamped");
+  command.footer(kExamples);
+  command.runs([a] { return run(*a); });
 }
 
 }  // namespace relit::player

@@ -367,58 +367,51 @@ int run(const Arguments& arguments) {
 
 }  // namespace
 
-Command add_stream(CLI::App& app) {
-  CLI::App* command =
-      app.add_subcommand("stream", "play a clip without a window, and tell how it went");
+void add_stream(CommandLine& line) {
+  Options command = line.add("stream", "play a clip without a window, and tell how it went");
   const auto a = std::make_shared<Arguments>();
-  add_source_options(*command, a->source, "path, - or http(s)://; a pipe cannot loop");
-  command->add_option("--clip", a->clip, "by name or number");
-  command->add_option("--layers", a->layers, "only the first so many layers");
-  command->add_option("--threads", a->threads, "that decode")
-      ->check(CLI::Range(1, 64))
-      ->capture_default_str();
-  CLI::Option* ring =
-      command->add_option("--ring", a->ring_bytes, "bytes of frames decoded ahead, such as 8MiB")
-          ->transform(CLI::AsSizeValue(false))
-          ->capture_default_str();
-  CLI::Option* budget =
+  add_source_options(command, a->source, "path, - or http(s)://; a pipe cannot loop");
+  command.add("--clip", a->clip, "by name or number");
+  command.add("--layers", a->layers, "only the first so many layers");
+  command.add("--threads", a->threads, "that decode").range(1, 64).shows_default();
+  Option ring = command.add("--ring", a->ring_bytes, "bytes of frames decoded ahead, such as 8MiB")
+                    .size_in_bytes()
+                    .shows_default();
+  Option budget =
       command
-          ->add_option(
-              "--memory-budget", a->memory_budget,
-              "bytes of the whole process's heap, such as 32MiB: what does not fit is given "
-              "up as `relit plan --headless` says")
-          ->excludes(ring);
+          .add("--memory-budget", a->memory_budget,
+               "bytes of the whole process's heap, such as 32MiB: what does not fit is given "
+               "up as `relit plan --headless` says")
+          .excludes(ring);
   command
-      ->add_flag("--fill", a->fill,
-                 "shows no frame before the budget's ring is full again, as it is when decoding is "
-                 "faster than playback: for measuring memory")
-      ->needs(budget);
-  command->add_option("--decoder", a->decoder,
-                      "try this decoder of libavcodec first, such as h264_v4l2m2m");
-  command->add_option("--loops", a->loops, "how often; 0: until --seconds are over")
-      ->capture_default_str();
-  command->add_option("--seconds", a->seconds, "at most so long")->check(CLI::NonNegativeNumber);
-  command->add_flag("--realtime", a->realtime,
-                    "at the clip's own pace, leaving out frames that come too late; otherwise as "
-                    "fast as possible");
-  command
-      ->add_option("--sink", a->sink, "planes: decode alone; composite: with --light, on the CPU")
-      ->check(CLI::IsMember({"planes", "composite"}))
-      ->capture_default_str();
-  command->add_option("--light", a->light.path, ".hdr, .exr (equirectangular) or .json");
-  add_light_options(*command, a->light);
-  command->add_flag("--json", a->json, "the statistics as JSON on standard output");
-  command->footer(
+      .flag("--fill", a->fill,
+            "shows no frame before the budget's ring is full again, as it is when decoding is "
+            "faster than playback: for measuring memory")
+      .needs(budget);
+  command.add("--decoder", a->decoder,
+              "try this decoder of libavcodec first, such as h264_v4l2m2m");
+  command.add("--loops", a->loops, "how often; 0: until --seconds are over").shows_default();
+  command.add("--seconds", a->seconds, "at most so long").not_negative();
+  command.flag("--realtime", a->realtime,
+               "at the clip's own pace, leaving out frames that come too late; otherwise as "
+               "fast as possible");
+  command.add("--sink", a->sink, "planes: decode alone; composite: with --light, on the CPU")
+      .one_of({"planes", "composite"})
+      .shows_default();
+  command.add("--light", a->light.path, ".hdr, .exr (equirectangular) or .json");
+  add_light_options(command, a->light);
+  command.flag("--json", a->json, "the statistics as JSON on standard output");
+  command.footer(
       "Examples:\n"
       "  relit stream man.relit --threads 2\n"
       "  relit stream man.relit --memory-budget 32MiB --sink composite --light sky.json\n"
       "  relit stream http://host/man.relit --realtime --loops 0 --seconds 60 --json");
-  return [a] {
+  command.runs([a] {
     if (a->loops == 0 && !(a->seconds > 0)) {
       return report({ErrorCode::kInvalid, "stream --loops 0 needs --seconds"});
     }
     return run(*a);
-  };
+  });
 }
 
 }  // namespace relit::player

@@ -126,20 +126,19 @@ int run(const Arguments& arguments) {
 
 }  // namespace
 
-Command add_validate(CLI::App& app) {
-  CLI::App* command = app.add_subcommand(
+void add_validate(CommandLine& line) {
+  Options command = line.add(
       "validate", "check that files keep every rule of the format, and that all of them decodes");
   const auto arguments = std::make_shared<Arguments>();
   command
-      ->add_option("files", arguments->sources,
-                   "paths, - or http(s)://; of a folder, all *.relit below it")
-      ->required();
-  command->add_flag("--json", arguments->json, "as JSON, to standard output");
-  command->add_flag("--warnings-as-errors", arguments->warnings_as_errors,
-                    "a file with warnings is not valid");
-  command->add_option("--threads", arguments->threads, "of each decoder")->check(CLI::Range(1, 64));
-  command->footer("container/VALIDATION.md lists what can be found.");
-  return [arguments] { return run(*arguments); };
+      .add("files", arguments->sources, "paths, - or http(s)://; of a folder, all *.relit below it")
+      .required();
+  command.flag("--json", arguments->json, "as JSON, to standard output");
+  command.flag("--warnings-as-errors", arguments->warnings_as_errors,
+               "a file with warnings is not valid");
+  command.add("--threads", arguments->threads, "of each decoder").range(1, 64);
+  command.footer("container/VALIDATION.md lists what can be found.");
+  command.runs([arguments] { return run(*arguments); });
 }
 
 }  // namespace relit::player

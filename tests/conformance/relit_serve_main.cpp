@@ -31,20 +31,15 @@ int print_frames(const std::string& path) {
 }
 
 /// What main() of the command with these words returns.
-int run(std::vector<std::string> words) {
+int run(const std::vector<std::string>& words) {
   av_log_set_level(AV_LOG_QUIET);
   if (words.size() == 2 && words[0] == "frames") return print_frames(words[1]);
-  CLI::App app("Conformance", "relit");
-  const player::Command info = player::add_info(app), validate = player::add_validate(app);
-  std::reverse(words.begin(), words.end());  // as CLI11 takes them
-  try {
-    app.parse(std::move(words));
-  } catch (const CLI::ParseError& error) {
-    app.exit(error, std::cout, std::cerr);
-    return player::kUsage;
-  }
-  if (app.got_subcommand("info")) return info();
-  return app.got_subcommand("validate") ? validate() : int{player::kUsage};
+  player::CommandLine line("Conformance", "relit", "relit");
+  player::add_info(line);
+  player::add_validate(line);
+  std::vector<const char*> arguments{"relit"};
+  for (const std::string& word : words) arguments.push_back(word.c_str());
+  return line.run(static_cast<int>(arguments.size()), arguments.data());
 }
 
 /// Runs them in a child whose standard output is `output`: the exit status, or 128 and a signal.
