@@ -134,6 +134,7 @@ class PlanePass {
   [[nodiscard]] std::vector<int> sheets_with(const Batch& batch) const;
   [[nodiscard]] std::string samplers() const;
   [[nodiscard]] std::string batch_text(std::size_t index, int groups) const;
+  [[nodiscard]] std::string weights_text(std::size_t index, int groups) const;
   [[nodiscard]] std::string sheet_name(int sheet) const;
   static std::string place_text(const Group& group, const Batch& batch, int lookup,
                                 const PlaneSheets& sheets);

@@ -12,7 +12,6 @@ namespace {
 constexpr const char* kBatchNames[] = {"BATCH_WEIGHTS",  "BATCH_PLANES",  "BATCH_MANTISSA",
                                        "BATCH_SHEET_0",  "BATCH_SHEET_1", "BATCH_SHEET_2",
                                        "BATCH_EXPONENTS"};
-constexpr const char* kWeightNames[] = {"WEIGHT_0", "WEIGHT_1", "WEIGHT_2", "REFERENCE"};
 
 std::string define(const std::string& name, const std::string& value) {
   return "#define " + name + " " + value + "\n";
@@ -26,6 +25,8 @@ std::string channel_names(unsigned channels) {
     if ((channels >> c & 1u) != 0) names += "rgb"[c];
   return names.empty() ? "r" : names;
 }
+
+constexpr const char* kWeightNames[] = {"WEIGHT_0", "WEIGHT_1", "WEIGHT_2", "REFERENCE"};
 
 // Ten digits tell any two floats apart.
 std::string vector_of(const std::array<float, 4>& v) {
@@ -62,8 +63,12 @@ std::string PlanePass::batch_text(std::size_t index, int groups) const {
                    sheet_name(batch.sheets[static_cast<std::size_t>(i)]));
   if (batch.exponent_sheet >= 0)
     text += define("BATCH_EXPONENTS", sheet_name(batch.exponent_sheet));
-  return text + "uniform vec4 " + weights + "[" + std::to_string(groups * batch.planes_per_group) +
-         "];\n";
+  return text + weights_text(index, groups);
+}
+
+std::string PlanePass::weights_text(std::size_t index, int groups) const {
+  return "uniform vec4 u_weight" + std::to_string(index) + "[" +
+         std::to_string(groups * batches_[index].planes_per_group) + "];\n";
 }
 
 std::string PlanePass::place_text(const Group& group, const Batch& batch, int lookup,
@@ -100,9 +105,7 @@ std::string PlanePass::weight_names(std::size_t index, int group, FlatWeights* f
 std::string PlanePass::weight_declarations(std::span<const int> counts) const {
   std::string text;
   for (std::size_t b = 0; b < batches_.size(); ++b)
-    if (counts[b] > 0)
-      text += "uniform vec4 u_weight" + std::to_string(b) + "[" +
-              std::to_string(counts[b] * batches_[b].planes_per_group) + "];\n";
+    if (counts[b] > 0) text += weights_text(b, counts[b]);
   return text;
 }
 
@@ -120,6 +123,8 @@ std::string PlanePass::text(PlaneTaps taps, std::span<const int> counts, const P
     text += "vec3 " + name + " {\n  vec3 sum = vec3(0.0);\n  vec2 low, high;\n";
     for (int g = 0; g < counts[b]; ++g) {
       std::string names = define("GROUP", std::to_string(g)), after = undefine("GROUP");
+      names += weight_names(b, g, flat);
+      for (const char* each : kWeightNames) after += undefine(each);
       for (int i = 0; i < batch.lookups(); ++i) {
         const std::string place =
             i == batch.planes_per_group ? "PLACE_E" : "PLACE_" + std::to_string(i);
@@ -133,8 +138,6 @@ std::string PlanePass::text(PlaneTaps taps, std::span<const int> counts, const P
             define(channels, channel_names(batch.groups[static_cast<std::size_t>(g)].channels[i]));
         after += undefine(channels);
       }
-      names += weight_names(b, g, flat);
-      for (const char* each : kWeightNames) after += undefine(each);
       text += names + std::string(shaders::composite_group) + after;
     }
     text += "  return sum;\n}\n";
