@@ -49,11 +49,13 @@ class Bake {
   Status find_seams(BakePoser& poser, const TraceGeometry& geometry);
   Status trace();
   Status write();
+  Result<PlaneSplit> split_planes(const CodingOptions& coding);
   Result<RangeScan> scan_range(decoders::NpyWriter* reference);
+  Result<TransferFrame> fill_frame(std::uint64_t frame);
   Status write_static(container::Writer& writer, const PlaneEncoder& encoder);
   Status write_segments(container::Writer& writer, PlaneEncoder& encoder);
   Result<decoders::NpyWriter> create_reference() const;
-  void fill_frame(std::uint64_t frame);
+  void fill_transfer(std::uint64_t frame);
 
   [[nodiscard]] std::size_t texels() const {
     return static_cast<std::size_t>(options_.transfer.width) *
@@ -71,7 +73,8 @@ class Bake {
   std::vector<std::vector<std::uint8_t>> buried_;  // by frame; empty where nothing is
   std::optional<PushPull> push_pull_;              // for frames in which nothing is buried
   std::optional<SeamStitcher> stitcher_;
-  std::vector<float> filled_;  // [coefficients][3][H][W] of the frame in hand
+  std::unique_ptr<BakeNormals> normals_;  // of models with a prediction
+  std::vector<float> filled_;             // [coefficients][3][H][W] of the frame in hand
   glm::vec3 bounds_min_{std::numeric_limits<float>::infinity()};
   glm::vec3 bounds_max_{-std::numeric_limits<float>::infinity()};
 };
@@ -151,7 +154,7 @@ Status Bake::trace() {
 }
 
 // Spreads the samples of a frame over its map, fills the rest and closes the seams.
-void Bake::fill_frame(std::uint64_t frame) {
+void Bake::fill_transfer(std::uint64_t frame) {
   const std::vector<std::uint8_t>& buried = buried_[frame];
   std::optional<PushPull> own;
   if (!buried.empty() || !push_pull_) {
@@ -179,6 +182,15 @@ void Bake::fill_frame(std::uint64_t frame) {
     push_pull.fill(out);
     stitcher_->stitch(out);
   });
+}
+
+Result<TransferFrame> Bake::fill_frame(std::uint64_t frame) {
+  fill_transfer(frame);
+  TransferFrame filled{filled_};
+  if (normals_) {
+    RELIT_ASSIGN(filled.normals, normals_->at(frame));
+  }
+  return filled;
 }
 
 Status Bake::write_static(container::Writer& writer, const PlaneEncoder& encoder) {
@@ -226,19 +238,44 @@ Status Bake::write_segments(container::Writer& writer, PlaneEncoder& encoder) {
   return {};
 }
 
+// Principal planes take a pass of their own over the clip.
+Result<PlaneSplit> Bake::split_planes(const CodingOptions& coding) {
+  const TransferShape shape{options_.transfer.order, options_.transfer.width,
+                            options_.transfer.height};
+  if (coding.planes == Planes::kColour) return PlaneSplit::colour(shape, coding);
+  std::vector<std::uint8_t> known(texels(), 0), counted(texels(), 0);
+  for (const TexelSample& sample : prepared_.samples) {
+    known[sample.texel] = 1;
+    counted[sample.texel] = sample.covered ? 1 : 0;
+  }
+  if (coding.predict) {
+    RELIT_ASSIGN(normals_, BakeNormals::create(prepared_, shape.width, shape.height));
+    known = normals_->mask();
+  }
+  PrincipalAnalysis analysis(shape, coding.predict, std::move(counted));
+  progress_.start("analyse", prepared_.frames, "frame");
+  for (std::uint64_t k = 0; k < prepared_.frames; ++k) {
+    RELIT_ASSIGN(const TransferFrame frame, fill_frame(k));
+    RELIT_TRY(analysis.add_frame(frame));
+    progress_.advance(k + 1);
+  }
+  progress_.finish();
+  return PlaneSplit::principal(shape, analysis.finish(coding.principal_count), known);
+}
+
 // Measures what the planes have to hold, and writes the reference, if there is one, on the way.
 Result<RangeScan> Bake::scan_range(decoders::NpyWriter* reference) {
   CodingOptions coding = options_.coding;
   coding.segment_frames = static_cast<int>(prepared_.segment_frames);
   coding.threads = thread_count(options_.transfer.threads);
-  const TransferShape shape{options_.transfer.order, options_.transfer.width,
-                            options_.transfer.height};
-  RELIT_ASSIGN(RangeScan scan, RangeScan::create(shape, coding));
+  RELIT_ASSIGN(coding, resolve(coding));
+  RELIT_ASSIGN(PlaneSplit split, split_planes(coding));
+  RELIT_ASSIGN(RangeScan scan, RangeScan::create(std::move(split), coding));
   progress_.start("measure", prepared_.frames, "frame");
   for (std::uint64_t k = 0; k < prepared_.frames; ++k) {
-    fill_frame(k);
-    RELIT_TRY(scan.add_frame(filled_));
-    if (reference != nullptr) RELIT_TRY(reference->write(std::span<const float>(filled_)));
+    RELIT_ASSIGN(const TransferFrame frame, fill_frame(k));
+    RELIT_TRY(scan.add_frame(frame));
+    if (reference != nullptr) RELIT_TRY(reference->write(frame.transfer));
     progress_.advance(k + 1);
   }
   progress_.finish();
@@ -263,8 +300,8 @@ Status Bake::write() {
   RELIT_TRY(write_static(writer, encoder));
   progress_.start("code", prepared_.frames, "frame");
   for (std::uint64_t k = 0; k < prepared_.frames; ++k) {
-    fill_frame(k);
-    RELIT_TRY(encoder.encode_frame(filled_));
+    RELIT_ASSIGN(const TransferFrame frame, fill_frame(k));
+    RELIT_TRY(encoder.encode_frame(frame));
     RELIT_TRY(write_segments(writer, encoder));
     progress_.advance(k + 1);
   }

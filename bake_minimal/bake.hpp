@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -18,6 +19,7 @@
 #include "bake_minimal/transfer.hpp"
 #include "container/base/result.hpp"
 #include "decoders/pose.hpp"
+#include "decoders/texel_normals.hpp"
 
 /// From a glTF file to a .relit file: the baker as one call.
 namespace relit::bake {
@@ -105,6 +107,28 @@ class BakePoser {
   ScenePose scene_pose_;
   std::vector<glm::mat4> world_;
   std::vector<glm::vec3> positions_, normals_, primitive_positions_, primitive_normals_;
+};
+
+/// The normals of the light map's texels, frame by frame, as the player will have them.
+class BakeNormals {
+ public:
+  /// Errors: those of decoders::PoseTrack and decoders::TexelNormals.
+  static Result<std::unique_ptr<BakeNormals>> create(const PreparedBake& prepared, int width,
+                                                     int height);
+  /// [H][W]; valid until the next call. Errors: those of decoders::PoseTrack.
+  Result<std::span<const glm::vec3>> at(std::uint64_t frame);
+  /// [H][W], 1 where a texel has a normal.
+  [[nodiscard]] std::vector<std::uint8_t> mask() const;
+
+ private:
+  BakeNormals(std::vector<decoders::Mesh> meshes, decoders::PoseTrack track, std::size_t texels)
+      : meshes_(std::move(meshes)), track_(std::move(track)), out_(texels) {}
+
+  std::vector<decoders::Mesh> meshes_;  ///< as they are in the file
+  decoders::PoseTrack track_;
+  decoders::Pose pose_;
+  std::optional<decoders::TexelNormals> normals_;
+  std::vector<glm::vec3> out_;
 };
 
 /// Bakes. The output appears under its name when everything is done, and not at all otherwise; the

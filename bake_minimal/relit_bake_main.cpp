@@ -30,12 +30,13 @@ Exit status: 0 success, 1 the input is bad, 2 usage or environment.)";
 struct Arguments {
   BakeOptions bake;
   std::string clip, lightmap_uv = "auto", layout = "layered", preset, chroma, model = "shlm",
-                    pose = "auto", fps = "50";
+                    planes = "auto", pose = "auto", fps = "50";
   std::vector<int> size{128};
   double crf = 0, ground_radius = 0;
   int bit_depth = 0;
   std::vector<float> ground_color;
-  bool list_clips = false, json = false, quiet = false, once = false, ground = false;
+  bool list_clips = false, json = false, quiet = false, once = false, ground = false,
+       no_prediction = false;
 };
 
 int report(const Error& error) {
@@ -136,6 +137,19 @@ void add_options(CLI::App& app, Arguments& a) {
   app.add_option("--chroma", a.chroma, "420, 444 or luma")
       ->check(CLI::IsMember({"420", "444", "luma"}))
       ->group("Coding");
+  app.add_option("--planes", a.planes,
+                 "what the planes are: colour (the channels of each coefficient), principal (the "
+                 "axes of what the mesh's normals do not predict), auto")
+      ->check(CLI::IsMember({"auto", "colour", "principal"}))
+      ->capture_default_str()
+      ->group("Coding");
+  app.add_option("--principal-count", a.bake.coding.principal_count,
+                 "principal planes at most; 0: all that show")
+      ->capture_default_str()
+      ->group("Coding");
+  app.add_flag("--no-prediction", a.no_prediction,
+               "principal planes of all of the transfer, the normals aside")
+      ->group("Coding");
   app.add_option(
          "--exponent-block", a.bake.coding.exponent_block,
          "side of the square of texels that shares an exponent: 1 to 32, a power of two; 0: none")
@@ -164,7 +178,7 @@ void add_options(CLI::App& app, Arguments& a) {
       ->capture_default_str()
       ->group("Coding");
   app.add_flag("--normals", a.bake.write_normals,
-               "write the normals, for hosts that shade for themselves")
+               "write the normals, for hosts that shade for themselves, in any case")
       ->group("Coding");
 
   app.add_option("--reference", a.bake.reference,
@@ -203,6 +217,9 @@ Status complete(Arguments& a, const CLI::App& app) {
     bake.coding.decode_memory = given.decode_memory;
   }
   if (a.layout == "grid" && a.preset.empty()) bake.coding.layout = Layout::kGrid;
+  if (a.planes == "colour") bake.coding.planes = Planes::kColour;
+  if (a.planes == "principal") bake.coding.planes = Planes::kPrincipal;
+  if (a.no_prediction) bake.coding.predict = false;
   if (app.count("--crf") > 0) bake.coding.crf = a.crf;
   if (a.bit_depth != 0) bake.coding.bit_depth = a.bit_depth;
   if (a.chroma == "420") bake.coding.chroma = container::Chroma::k420;
