@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "bake_minimal/frame_store.hpp"
 #include "bake_minimal/parallel.hpp"
@@ -34,23 +35,33 @@ class Bake {
  public:
   Bake(const BakeOptions& options, Progress& progress) : options_(options), progress_(progress) {}
 
-  Result<BakeSummary> run() {
-    RELIT_TRY(check_outputs());
+  Result<std::vector<BakeSummary>> run() {
+    for (const Output& output : outputs()) RELIT_TRY(check_output(output.path));
+    if (!options_.reference.empty()) RELIT_TRY(check_output(options_.reference));
     RELIT_ASSIGN(prepared_, prepare_bake(options_));
     summarize();
     RELIT_TRY(trace());
-    RELIT_TRY(write());
-    return std::move(summary_);
+    std::vector<BakeSummary> summaries;
+    for (const Output& output : outputs()) {
+      RELIT_ASSIGN(BakeSummary summary, write(output, summaries.empty()));
+      summaries.push_back(std::move(summary));
+    }
+    return summaries;
   }
 
  private:
-  Status check_outputs() const;
+  struct Output {
+    std::filesystem::path path;
+    CodingOptions coding;
+  };
+  [[nodiscard]] std::vector<Output> outputs() const;
+  static Status check_output(const std::filesystem::path& path);
   void summarize();
   Status find_seams(BakePoser& poser, const TraceGeometry& geometry);
   Status trace();
-  Status write();
+  Result<BakeSummary> write(const Output& output, bool with_reference);
   Result<PlaneSplit> split_planes(const CodingOptions& coding);
-  Result<RangeScan> scan_range(decoders::NpyWriter* reference);
+  Result<RangeScan> scan_range(const CodingOptions& options, decoders::NpyWriter* reference);
   Result<TransferFrame> fill_frame(std::uint64_t frame);
   Status write_static(container::Writer& writer, const PlaneEncoder& encoder);
   Status write_segments(container::Writer& writer, PlaneEncoder& encoder);
@@ -79,11 +90,20 @@ class Bake {
   glm::vec3 bounds_max_{-std::numeric_limits<float>::infinity()};
 };
 
+std::vector<Bake::Output> Bake::outputs() const {
+  if (options_.sweep.empty()) return {{options_.output, options_.coding}};
+  std::vector<Output> outputs;
+  for (const CodingVariant& variant : options_.sweep) {
+    std::filesystem::path path = options_.output;
+    path.replace_filename(path.stem().string() + "-" + variant.name + path.extension().string());
+    outputs.push_back({std::move(path), variant.coding});
+  }
+  return outputs;
+}
+
 // An output that cannot be written should be known before an hour of tracing, not after it.
-Status Bake::check_outputs() const {
-  RELIT_TRY(container::FileSink::create(options_.output.string()));
-  if (!options_.reference.empty())
-    RELIT_TRY(container::FileSink::create(options_.reference.string()));
+Status Bake::check_output(const std::filesystem::path& path) {
+  RELIT_TRY(container::FileSink::create(path.string()));
   return {};
 }
 
@@ -264,8 +284,8 @@ Result<PlaneSplit> Bake::split_planes(const CodingOptions& coding) {
 }
 
 // Measures what the planes have to hold, and writes the reference, if there is one, on the way.
-Result<RangeScan> Bake::scan_range(decoders::NpyWriter* reference) {
-  CodingOptions coding = options_.coding;
+Result<RangeScan> Bake::scan_range(const CodingOptions& options, decoders::NpyWriter* reference) {
+  CodingOptions coding = options;
   coding.segment_frames = static_cast<int>(prepared_.segment_frames);
   coding.threads = thread_count(options_.transfer.threads);
   RELIT_ASSIGN(coding, resolve(coding));
@@ -282,19 +302,21 @@ Result<RangeScan> Bake::scan_range(decoders::NpyWriter* reference) {
   return scan;
 }
 
-Status Bake::write() {
+Result<BakeSummary> Bake::write(const Output& output, bool with_reference) {
   const Stopwatch watch;
+  const BakeSummary before = summary_;
+  normals_.reset();
   std::optional<decoders::NpyWriter> reference;
-  if (!options_.reference.empty()) {
+  if (with_reference && !options_.reference.empty()) {
     RELIT_ASSIGN(reference, create_reference());
   }
-  RELIT_ASSIGN(RangeScan scan, scan_range(reference ? &*reference : nullptr));
+  RELIT_ASSIGN(RangeScan scan, scan_range(output.coding, reference ? &*reference : nullptr));
   ModelIds ids;
   ids.clip_id = prepared_.pose.track.clip_id;
   ids.first_track_id = prepared_.pose.track.track_id + 1;
   RELIT_ASSIGN(PlaneEncoder encoder, PlaneEncoder::begin(std::move(scan), ids));
   summary_.decoder_bytes = encoder.decoder_bytes();
-  RELIT_ASSIGN(auto sink, container::FileSink::create(options_.output.string()));
+  RELIT_ASSIGN(auto sink, container::FileSink::create(output.path.string()));
   RELIT_ASSIGN(container::Writer writer,
                container::Writer::create(*sink, "relit-bake " RELIT_VERSION));
   RELIT_TRY(write_static(writer, encoder));
@@ -313,7 +335,8 @@ Status Bake::write() {
   RELIT_TRY(sink->commit());
   summary_.bytes = writer.bytes_written();
   summary_.code_s = watch.seconds();
-  return {};
+  summary_.output = output.path;
+  return std::exchange(summary_, before);
 }
 
 Result<decoders::NpyWriter> Bake::create_reference() const {
@@ -326,7 +349,7 @@ Result<decoders::NpyWriter> Bake::create_reference() const {
 
 }  // namespace
 
-Result<BakeSummary> bake(const BakeOptions& options, Progress& progress) {
+Result<std::vector<BakeSummary>> bake(const BakeOptions& options, Progress& progress) {
   return Bake(options, progress).run();
 }
 

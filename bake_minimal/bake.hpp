@@ -16,6 +16,7 @@
 #include "bake_minimal/pose_encoder.hpp"
 #include "bake_minimal/progress.hpp"
 #include "bake_minimal/scene.hpp"
+#include "bake_minimal/sweep.hpp"
 #include "bake_minimal/transfer.hpp"
 #include "container/base/result.hpp"
 #include "decoders/pose.hpp"
@@ -37,12 +38,16 @@ struct BakeOptions {
   std::optional<GroundOptions> ground;
   TransferOptions transfer;  ///< its width and height are the light map's
   CodingOptions coding;      ///< segment_frames comes from segment_s
+  /// Where not empty, the clip is coded once for each of them in place of `coding`: into the
+  /// output's name with "-" and the variant's before its extension.
+  std::vector<CodingVariant> sweep{};
   PoseChoice pose = PoseChoice::kAuto;
   bool write_normals = false;
 };
 
 /// What a bake made, for people and for --json.
 struct BakeSummary {
+  std::filesystem::path output;
   std::string clip;
   std::uint64_t frames = 0;
   int order = 0, width = 0, height = 0;
@@ -131,9 +136,9 @@ class BakeNormals {
   std::vector<glm::vec3> out_;
 };
 
-/// Bakes. The output appears under its name when everything is done, and not at all otherwise; the
-/// same options give the same bytes for any number of threads. Errors name the file, the place and
-/// the remedy.
-[[nodiscard]] Result<BakeSummary> bake(const BakeOptions& options, Progress& progress);
+/// Bakes: one file, or one for each variant of a sweep, of one trace. A file appears under its name
+/// when it is complete, and not at all otherwise; the same options give the same bytes for any
+/// number of threads. Errors name the file, the place and the remedy.
+[[nodiscard]] Result<std::vector<BakeSummary>> bake(const BakeOptions& options, Progress& progress);
 
 }  // namespace relit::bake

@@ -82,9 +82,14 @@ Status pack(const BakeOptions& options, PreparedBake& out) {
   pack_options.clip = out.clip;
   // What is predicted from normals is predicted from those in the file. A twentieth of a mesh, they
   // save a fifth of the planes over what the triangles alone tell.
-  RELIT_ASSIGN(const CodingOptions coding, resolve(options.coding));
-  pack_options.normals =
-      options.write_normals || (coding.planes == Planes::kPrincipal && coding.predict);
+  pack_options.normals = options.write_normals;
+  std::vector<CodingOptions> codings{options.coding};
+  if (!options.sweep.empty()) codings.clear();
+  for (const CodingVariant& variant : options.sweep) codings.push_back(variant.coding);
+  for (const CodingOptions& each : codings) {
+    RELIT_ASSIGN(const CodingOptions coding, resolve(each));
+    pack_options.normals |= coding.planes == Planes::kPrincipal && coding.predict;
+  }
   RELIT_ASSIGN(out.packed, pack_scene(out.scene, pack_options));
   std::vector<double> times(out.frames);
   for (std::uint64_t k = 0; k < out.frames; ++k) times[k] = out.time_s(k);
