@@ -15,6 +15,8 @@
 #include "container/byte_sink.hpp"
 #include "container/writer.hpp"
 #include "decoders/npy.hpp"
+#include "decoders/plane_decoder.hpp"
+#include "decoders/relit_error.hpp"
 #include "decoders/sh.hpp"
 
 namespace relit::bake {
@@ -61,6 +63,8 @@ class Bake {
   Status trace();
   Result<BakeSummary> write(const Output& output, bool with_reference);
   Result<PlaneSplit> split_planes(const CodingOptions& coding);
+  Result<RateChoice> find_rate(const RangeScan& scan, const ModelIds& ids);
+  Result<double> try_rate(RangeScan scan, const ModelIds& ids, double crf);
   Result<RangeScan> scan_range(const CodingOptions& options, decoders::NpyWriter* reference);
   Result<TransferFrame> fill_frame(std::uint64_t frame);
   Status write_static(container::Writer& writer, const PlaneEncoder& encoder);
@@ -302,6 +306,54 @@ Result<RangeScan> Bake::scan_range(const CodingOptions& options, decoders::NpyWr
   return scan;
 }
 
+Result<RateChoice> Bake::find_rate(const RangeScan& scan, const ModelIds& ids) {
+  const CodingOptions& coding = scan.options();
+  if (coding.lossless) {
+    return fail(ErrorCode::kInvalid, "--target-psnr needs a lossy codec, and not --lossless");
+  }
+  return search_rate(*options_.target_psnr_db, rate_range(coding), *coding.crf,
+                     [&](double crf) { return try_rate(scan, ids, crf); });
+}
+
+// Codes and decodes the whole clip.
+Result<double> Bake::try_rate(RangeScan scan, const ModelIds& ids, double crf) {
+  scan.set_crf(crf);
+  RELIT_ASSIGN(PlaneEncoder encoder, PlaneEncoder::begin(std::move(scan), ids));
+  RELIT_ASSIGN(auto decoder, decoders::PlaneDecoder::open(encoder.model(), encoder.layers()));
+  const auto take = [&]() -> Status {
+    while (std::optional<EncodedSegment> segment = encoder.take_segment())
+      for (container::ChunkRecord& chunk : segment->chunks)
+        RELIT_TRY(decoder.add_chunk(segment->segment, std::move(chunk)));
+    return {};
+  };
+  std::vector<std::uint8_t> covered(texels(), 0);
+  for (const TexelSample& sample : prepared_.samples)
+    covered[sample.texel] = sample.covered ? 1 : 0;
+  decoders::RelitError error(decoders::standard_lights(),
+                             decoders::coefficient_count(options_.transfer.order), covered);
+  progress_.start("try", 2 * prepared_.frames, "frame");
+  for (std::uint64_t k = 0; k < prepared_.frames; ++k) {
+    RELIT_ASSIGN(const TransferFrame frame, fill_frame(k));
+    RELIT_TRY(encoder.encode_frame(frame));
+    RELIT_TRY(take());
+    progress_.advance(k + 1);
+  }
+  RELIT_TRY(encoder.finish());
+  RELIT_TRY(take());
+  std::vector<float> decoded(planes() * texels());
+  decoders::FrameView view;
+  for (std::uint64_t k = 0; k < prepared_.frames; ++k) {
+    RELIT_ASSIGN(const TransferFrame frame, fill_frame(k));
+    RELIT_TRY(decoder.frame(k, view));
+    RELIT_TRY(decoders::reconstruct(view.planes(), encoder.model(), encoder.layers(), decoded,
+                                    frame.normals));
+    error.add_frame(frame.transfer, decoded);
+    progress_.advance(prepared_.frames + k + 1);
+  }
+  progress_.finish();
+  return error.figures().psnr_db;
+}
+
 Result<BakeSummary> Bake::write(const Output& output, bool with_reference) {
   const Stopwatch watch;
   const BakeSummary before = summary_;
@@ -314,6 +366,12 @@ Result<BakeSummary> Bake::write(const Output& output, bool with_reference) {
   ModelIds ids;
   ids.clip_id = prepared_.pose.track.clip_id;
   ids.first_track_id = prepared_.pose.track.track_id + 1;
+  if (options_.target_psnr_db) {
+    RELIT_ASSIGN(const RateChoice rate, find_rate(scan, ids));
+    scan.set_crf(rate.crf);
+    summary_.relit_psnr_db = rate.psnr_db;
+  }
+  summary_.crf = *scan.options().crf;
   RELIT_ASSIGN(PlaneEncoder encoder, PlaneEncoder::begin(std::move(scan), ids));
   summary_.decoder_bytes = encoder.decoder_bytes();
   RELIT_ASSIGN(auto sink, container::FileSink::create(output.path.string()));

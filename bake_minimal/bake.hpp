@@ -41,6 +41,9 @@ struct BakeOptions {
   /// Where not empty, the clip is coded once for each of them in place of `coding`: into the
   /// output's name with "-" and the variant's before its extension.
   std::vector<CodingVariant> sweep{};
+  /// Where given, the rate factor is sought with which the relit PSNR over the standard lights is
+  /// this or a little more.
+  std::optional<double> target_psnr_db{};
   PoseChoice pose = PoseChoice::kAuto;
   bool write_normals = false;
 };
@@ -58,6 +61,8 @@ struct BakeSummary {
   float least_t0 = std::numeric_limits<float>::infinity();
   float largest_t0 = -std::numeric_limits<float>::infinity();
   double trace_s = 0, code_s = 0;
+  double crf = 0;
+  std::optional<double> relit_psnr_db;  ///< where a target was given
   std::uint64_t bytes = 0, image_bytes = 0, mesh_bytes = 0, pose_bytes = 0, video_bytes = 0;
   std::uint64_t decoder_bytes = 0;  ///< of the pictures that the decoders hold
   std::vector<std::string> warnings;

@@ -88,6 +88,14 @@ Status check_numbers(const CodingOptions& o, const CodecTraits& codec) {
 
 }  // namespace
 
+RateRange rate_range(const CodingOptions& o) {
+  const auto codec = std::find_if(kCodecs.begin(), kCodecs.end(),
+                                  [&](const CodecTraits& t) { return t.name == o.codec; });
+  const bool eight_bit_h264 = o.codec == "h264" && *o.bit_depth == 8;
+  const bool fine = o.codec == "h264" || o.codec == "hevc";
+  return {eight_bit_h264 ? 0 : codec->crf_min, codec->crf_max, fine ? 0.25 : 1};
+}
+
 CodingOptions paper_options() {
   CodingOptions options;
   options.codec = "mpeg4";

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "bake_minimal/rate_search.hpp"
 #include "container/base/result.hpp"
 #include "container/records.hpp"
 
@@ -84,6 +85,9 @@ struct CodingOptions {
   /// Layers encoded at once. The bytes do not depend on it.
   int threads = 1;
 };
+
+/// The rate factors that a codec takes, and how finely.
+[[nodiscard]] RateRange rate_range(const CodingOptions& resolved);
 
 /// Xu et al., section 4: the order-N grid, mantissas of 8 bits through MPEG-4's 4:2:0, one exponent
 /// for every texel of every frame, through FFV1.

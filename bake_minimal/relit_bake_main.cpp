@@ -32,7 +32,7 @@ struct Arguments {
   std::string clip, lightmap_uv = "auto", layout = "layered", preset, chroma, model = "shlm",
                     planes = "auto", sweep, pose = "auto", fps = "50";
   std::vector<int> size{128};
-  double crf = 0, ground_radius = 0;
+  double crf = 0, target_psnr = 0, ground_radius = 0;
   int bit_depth = 0;
   std::vector<float> ground_color;
   bool list_clips = false, json = false, quiet = false, once = false, ground = false,
@@ -181,6 +181,10 @@ void add_options(CLI::App& app, Arguments& a) {
                "write the normals, for hosts that shade for themselves, in any case")
       ->group("Coding");
 
+  app.add_option("--target-psnr", a.target_psnr,
+                 "seek the rate factor for this relit PSNR, dB over the standard lights")
+      ->check(CLI::Range(10.0, 100.0))
+      ->group("Coding");
   app.add_option("--sweep", a.sweep,
                  "code one trace in several ways, such as \"codec=h264,hevc crf=12,18,24\": "
                  "OUT-h264-crf12.relit and so on")
@@ -229,6 +233,7 @@ Status complete(Arguments& a, const CLI::App& app) {
   if (a.chroma == "420") bake.coding.chroma = container::Chroma::k420;
   if (a.chroma == "444") bake.coding.chroma = container::Chroma::k444;
   if (a.chroma == "luma") bake.coding.chroma = container::Chroma::kLuma;
+  if (app.count("--target-psnr") > 0) bake.target_psnr_db = a.target_psnr;
   if (!a.sweep.empty()) {
     RELIT_ASSIGN(bake.sweep, expand_sweep(a.sweep, bake.coding));
   }
@@ -267,6 +272,8 @@ nlohmann::ordered_json summary_json(const BakeSummary& s, const BakeOptions& opt
                          {"reason", s.atlas.reason}};
   json["rays"] = s.rays;
   json["t0"] = {s.least_t0, s.largest_t0};
+  json["crf"] = s.crf;
+  if (s.relit_psnr_db) json["relit_psnr_db"] = *s.relit_psnr_db;
   json["seconds"] = {{"trace", s.trace_s}, {"code", s.code_s}};
   json["bytes"] = {{"file", s.bytes},        {"images", s.image_bytes},
                    {"meshes", s.mesh_bytes}, {"pose", s.pose_bytes},
@@ -289,6 +296,7 @@ void print_summary(const BakeSummary& s) {
                s.width, s.height,
                s.atlas.set < 0 ? "unwrapped" : ("UV set " + std::to_string(s.atlas.set)).c_str(),
                s.atlas.charts, 100 * s.atlas.coverage);
+  if (s.relit_psnr_db) std::fprintf(stderr, "rate factor %g: %.2f dB\n", s.crf, *s.relit_psnr_db);
   std::fprintf(
       stderr, "%llu bytes: light %llu, pose %llu, meshes %llu, images %llu\n",
       static_cast<unsigned long long>(s.bytes), static_cast<unsigned long long>(s.video_bytes),
