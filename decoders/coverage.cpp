@@ -13,7 +13,7 @@ void mark_covered_texels(std::span<const glm::vec2> uv, std::span<const std::uin
     const FixedTriangle triangle(uv[indices[i]], uv[indices[i + 1]], uv[indices[i + 2]], width,
                                  height);
     if (triangle.degenerate()) continue;
-    triangle.for_each_row(width, height, [&](int y, int x0, int x1) {
+    triangle.for_each_row(0, height, width, [&](int y, int x0, int x1) {
       const auto row = mask.subspan(static_cast<std::size_t>(y) * static_cast<std::size_t>(width));
       std::fill(row.begin() + x0, row.begin() + x1 + 1, std::uint8_t{1});
     });

@@ -93,6 +93,7 @@ class Window {
   float points_per_unit_ = 1;  // of the overlay, in a unit of SDL's window coordinates
   bool fullscreen_ = false, pointer_shown_ = true, leave_ = false, exposed_ = true;
   bool overlay_shown_ = false;
+  double drawn_s_ = -1;  // when the last picture was
   std::string shown_title_;
   std::uint64_t shown_ = 0, counted_ = 0;
   double counted_since_s_ = now_s(), last_picture_s_ = 0;
@@ -249,9 +250,11 @@ Status Window::show() {
     session_->say(updated.error().message, true);
   }
   update_pointer(now);
-  const bool overlay =
-      events_.input().scrubbing() || pointer_.visibility(now) > 0 || session_->has_overlay();
-  const bool draw = exposed_ || session_->changed() || overlay || overlay_shown_;
+  const bool moving = events_.input().scrubbing() || pointer_.visibility(now) > 0;
+  const bool overlay = moving || session_->has_overlay();
+  // Where drawing takes the processor it would take all of it.
+  const bool due = overlay && now - drawn_s_ >= session_->overlay_period_s();
+  const bool draw = exposed_ || session_->changed() || moving || due || overlay != overlay_shown_;
   if (!draw) {
     SDL_WaitEventTimeout(nullptr,
                          static_cast<int>(std::clamp(session_->idle_s(), 0.001, 0.1) * 1e3));
@@ -259,6 +262,7 @@ Status Window::show() {
   }
   exposed_ = false;
   overlay_shown_ = overlay;
+  drawn_s_ = now;
   SDL_GL_GetDrawableSize(window_.get(), &width_px_, &height_px_);
   if (width_px_ < 1 || height_px_ < 1) {
     SDL_WaitEventTimeout(nullptr, 50);

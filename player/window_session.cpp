@@ -75,6 +75,11 @@ double WindowSession::idle_s() const {
   return idle;
 }
 
+double WindowSession::overlay_period_s() const {
+  // A message fades; numbers and what is waited for are read.
+  return message_until_s_ > now_s_ ? 1.0 / 60 : 0.25;
+}
+
 std::string WindowSession::light_text() const {
   if (lights_.empty()) return "white";
   std::string text = lights_[light_].name;

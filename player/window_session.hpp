@@ -63,6 +63,8 @@ class WindowSession {
   [[nodiscard]] bool has_overlay() const;
   /// How long nothing will change by itself, seconds.
   [[nodiscard]] double idle_s() const;
+  /// How often what is written over the picture is drawn anew while nothing else changes.
+  [[nodiscard]] double overlay_period_s() const;
 
   [[nodiscard]] const std::string& title() const { return title_; }
   [[nodiscard]] PlaybackLoss loss() const {

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MIT
-// relit_psnr REFERENCE.npy DECODED.npy MASK.npy LIGHTS.json: the figure by which lossy choices are
-// compared. Composite of every light, frame and covered texel; peak = 99.9th percentile of the
-// reference's composites; PSNR = 10 log10(peak² / MSE) over lights, frames, texels and channels. A
-// decoded array of lower order counts what it lacks as zero, a smaller map is enlarged bilinearly.
+// relit_psnr REFERENCE.npy DECODED.npy MASK.npy: the figure by which lossy choices are compared, of
+// arrays (decoders/relit_error.hpp). A decoded array of lower order counts what it lacks as zero, a
+// smaller map is enlarged bilinearly.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
-#include <nlohmann/json.hpp>
+#include <span>
+#include <vector>
 
 #include "decoders/npy.hpp"
+#include "decoders/relit_error.hpp"
 
 using relit::decoders::NpyArray;
 
@@ -43,16 +43,6 @@ std::vector<Tap> taps(std::size_t from, std::size_t to) {
   return result;
 }
 
-double percentile(std::vector<float>& values, double percent) {
-  const double at = percent / 100 * static_cast<double>(values.size() - 1);
-  const auto low = static_cast<std::ptrdiff_t>(at);
-  std::nth_element(values.begin(), values.begin() + low, values.end());
-  const double a = values[static_cast<std::size_t>(low)];
-  if (low + 1 == static_cast<std::ptrdiff_t>(values.size())) return a;
-  const double b = *std::min_element(values.begin() + low + 1, values.end());
-  return a + (b - a) * (at - static_cast<double>(low));
-}
-
 NpyArray load(const char* path) {
   auto array = relit::decoders::read_npy(path);
   if (!array) {
@@ -62,78 +52,53 @@ NpyArray load(const char* path) {
   return std::move(*array);
 }
 
+// One frame of `decoded` at the reference's order and size.
+std::vector<float> conform(const NpyArray& decoded, const Shape& d, const Shape& r,
+                           std::size_t frame) {
+  const std::vector<Tap> rows = taps(d.height, r.height), columns = taps(d.width, r.width);
+  std::vector<float> out(r.coefficients * 3 * r.height * r.width);
+  for (std::size_t plane = 0; plane < 3 * d.coefficients; ++plane) {
+    const float* const tile =
+        &decoded.values[(frame * d.coefficients * 3 + plane) * d.height * d.width];
+    const auto at = [&](std::size_t i, std::size_t j) {
+      return static_cast<double>(tile[i * d.width + j]);
+    };
+    float* target = out.data() + plane * r.height * r.width;
+    for (const Tap& y : rows) {
+      for (const Tap& x : columns) {
+        const double low = (1 - x.t) * at(y.low, x.low) + x.t * at(y.low, x.high);
+        const double high = (1 - x.t) * at(y.high, x.low) + x.t * at(y.high, x.high);
+        *target++ = static_cast<float>((1 - y.t) * low + y.t * high);
+      }
+    }
+  }
+  return out;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 5) {
-    std::fprintf(stderr, "usage: relit_psnr REFERENCE.npy DECODED.npy MASK.npy LIGHTS.json\n");
+  if (argc != 4) {
+    std::fprintf(stderr, "usage: relit_psnr REFERENCE.npy DECODED.npy MASK.npy\n");
     return 2;
   }
   const NpyArray reference = load(argv[1]), decoded = load(argv[2]), mask = load(argv[3]);
   const Shape r = shape_of(reference), d = shape_of(decoded);
-  if (r.frames != d.frames || d.coefficients > r.coefficients) {
-    std::fprintf(stderr, "relit_psnr: frames or coefficients do not fit\n");
+  if (r.frames != d.frames || d.coefficients > r.coefficients ||
+      mask.values.size() != r.height * r.width) {
+    std::fprintf(stderr, "relit_psnr: frames, coefficients or mask do not fit\n");
     return 1;
   }
-  std::ifstream in(argv[4]);
-  const auto lights = nlohmann::json::parse(in).at("lights");
-  std::vector<std::size_t> texels;
-  for (std::size_t i = 0; i < mask.values.size(); ++i) {
-    if (mask.values[i] > 0) texels.push_back(i);
-  }
-  const auto rows = taps(d.height, r.height), columns = taps(d.width, r.width);
-  // Weights out of the JSON tree once: [channel][light][coefficient].
-  std::vector<double> weights;
-  for (std::size_t c = 0; c < 3; ++c) {
-    for (const auto& light : lights) {
-      for (std::size_t n = 0; n < r.coefficients; ++n)
-        weights.push_back(light.at("sh").at(n).at(c).get<double>());
-    }
-  }
-  std::vector<float> composites, errors;
-  const std::size_t total = lights.size() * r.frames * texels.size() * 3;
-  composites.reserve(total), errors.reserve(total);
-  std::vector<double> truth(r.coefficients), error(r.coefficients);
-  double squares = 0;
-  for (std::size_t f = 0; f < r.frames; ++f) {
-    for (std::size_t c = 0; c < 3; ++c) {
-      for (const std::size_t texel : texels) {
-        const Tap& y = rows[texel / r.width];
-        const Tap& x = columns[texel % r.width];
-        for (std::size_t n = 0; n < r.coefficients; ++n) {
-          double value = 0;
-          if (n < d.coefficients) {
-            const float* tile =
-                &decoded.values[((f * d.coefficients + n) * 3 + c) * d.height * d.width];
-            const auto at = [&](std::size_t i, std::size_t j) {
-              return static_cast<double>(tile[i * d.width + j]);
-            };
-            value = (1 - y.t) * ((1 - x.t) * at(y.low, x.low) + x.t * at(y.low, x.high)) +
-                    y.t * ((1 - x.t) * at(y.high, x.low) + x.t * at(y.high, x.high));
-          }
-          truth[n] = static_cast<double>(
-              reference.values[((f * r.coefficients + n) * 3 + c) * r.height * r.width + texel]);
-          error[n] = value - truth[n];
-        }
-        for (std::size_t l = 0; l < lights.size(); ++l) {
-          const double* weight = &weights[(c * lights.size() + l) * r.coefficients];
-          double composite = 0, difference = 0;
-          for (std::size_t n = 0; n < r.coefficients; ++n) {
-            composite += weight[n] * truth[n];
-            difference += weight[n] * error[n];
-          }
-          composites.push_back(static_cast<float>(composite));
-          errors.push_back(static_cast<float>(std::abs(difference)));
-          squares += difference * difference;
-        }
-      }
-    }
-  }
-  const double peak = percentile(composites, 99.9);
-  const double mse = squares / static_cast<double>(errors.size());
-  const double largest = *std::max_element(errors.begin(), errors.end());
-  std::printf("%.2f dB  p99 %.5f  max %.5f  peak %.4f\n",
-              mse > 0 ? 10 * std::log10(peak * peak / mse) : INFINITY,
-              percentile(errors, 99) / peak, largest / peak, peak);
+  std::vector<std::uint8_t> covered(mask.values.size());
+  for (std::size_t i = 0; i < covered.size(); ++i) covered[i] = mask.values[i] > 0 ? 1 : 0;
+  relit::decoders::RelitError error(relit::decoders::standard_lights(),
+                                    static_cast<int>(r.coefficients), covered);
+  const std::size_t frame = r.coefficients * 3 * r.height * r.width;
+  for (std::size_t f = 0; f < r.frames; ++f)
+    error.add_frame(std::span(reference.values).subspan(f * frame, frame),
+                    conform(decoded, d, r, f));
+  const auto figures = error.figures();
+  std::printf("%.2f dB  p99 %.5f  max %.5f  peak %.4f\n", figures.psnr_db, figures.p99,
+              figures.largest, figures.peak);
   return 0;
 }
