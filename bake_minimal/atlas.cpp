@@ -8,9 +8,9 @@
 
 #include "bake_minimal/atlas_check.hpp"
 #include "bake_minimal/atlas_edit.hpp"
-#include "bake_minimal/texel_raster.hpp"
 #include "bake_minimal/unwrap.hpp"
 #include "container/base/limits.hpp"
+#include "decoders/texel_raster.hpp"
 
 namespace relit::bake {
 namespace {
@@ -193,8 +193,9 @@ class UvAssigner {
     for (std::size_t t = 0; 3 * t + 2 < soup.indices.size(); ++t) {
       const double area = posed_area(soup, t);
       all += area;
-      const FixedTriangle fixed(soup.uv[soup.indices[3 * t]], soup.uv[soup.indices[3 * t + 1]],
-                                soup.uv[soup.indices[3 * t + 2]], kCheckSide, kCheckSide);
+      const decoders::FixedTriangle fixed(soup.uv[soup.indices[3 * t]],
+                                          soup.uv[soup.indices[3 * t + 1]],
+                                          soup.uv[soup.indices[3 * t + 2]], kCheckSide, kCheckSide);
       if (fixed.degenerate()) without += area;
     }
     return all > 0 ? without / all : 0.0;

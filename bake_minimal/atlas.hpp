@@ -9,8 +9,11 @@
 
 #include "bake_minimal/scene.hpp"
 #include "container/base/result.hpp"
+#include "decoders/texel_raster.hpp"
 
 namespace relit::bake {
+
+using decoders::TexelSample;
 
 struct AtlasOptions {
   enum class Source { kAuto, kSet, kUnwrap };
@@ -56,21 +59,5 @@ inline constexpr float kOutsideTolerance = 1e-5f;
 [[nodiscard]] Result<AtlasReport> assign_lightmap_uvs(Scene& scene,
                                                       std::span<const std::vector<glm::vec3>> posed,
                                                       const AtlasOptions& options);
-
-/// One texel to be sampled: texel centre, or the nearest surface point where only the texel's
-/// square touches a chart.
-struct TexelSample {
-  std::uint32_t texel = 0;     ///< y × width + x
-  std::uint32_t triangle = 0;  ///< into the triangles given
-  float b1 = 0, b2 = 0;        ///< barycentric: p = (1-b1-b2)·p0 + b1·p1 + b2·p2
-  bool covered = false;        ///< the centre lies inside the chart (exact, top-left rule)
-};
-
-/// Rasterises triangles of light-map UVs; exact fixed point with the top-left rule, so that
-/// triangles that share an edge never both own a texel. Samples are in order of their texel; one a
-/// texel.
-[[nodiscard]] std::vector<TexelSample> rasterize_atlas(std::span<const glm::vec2> uv,
-                                                       std::span<const std::uint32_t> indices,
-                                                       int width, int height);
 
 }  // namespace relit::bake

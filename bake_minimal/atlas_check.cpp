@@ -6,7 +6,7 @@
 #include <limits>
 #include <numeric>
 
-#include "bake_minimal/texel_raster.hpp"
+#include "decoders/texel_raster.hpp"
 
 namespace relit::bake {
 namespace {
@@ -17,9 +17,9 @@ template <class Visit>
 void for_each_owned(std::span<const glm::vec2> uv, std::span<const std::uint32_t> indices,
                     glm::ivec2 size, Visit&& visit) {
   for (std::size_t t = 0; 3 * t + 2 < indices.size(); ++t) {
-    FixedTriangle(uv[indices[3 * t]], uv[indices[3 * t + 1]], uv[indices[3 * t + 2]], size.x,
-                  size.y)
-        .for_each_row(size.x, size.y, [&](int y, int x0, int x1) {
+    decoders::FixedTriangle(uv[indices[3 * t]], uv[indices[3 * t + 1]], uv[indices[3 * t + 2]],
+                            size.x, size.y)
+        .for_each_row(0, size.y, size.x, [&](int y, int x0, int x1) {
           const std::size_t row = static_cast<std::size_t>(y) * static_cast<std::size_t>(size.x);
           for (int x = x0; x <= x1; ++x) visit(t, row + static_cast<std::size_t>(x));
         });

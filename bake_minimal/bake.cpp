@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "bake_minimal/frame_store.hpp"
 #include "bake_minimal/parallel.hpp"
@@ -34,26 +35,38 @@ class Bake {
  public:
   Bake(const BakeOptions& options, Progress& progress) : options_(options), progress_(progress) {}
 
-  Result<BakeSummary> run() {
-    RELIT_TRY(check_outputs());
+  Result<std::vector<BakeSummary>> run() {
+    for (const Output& output : outputs()) RELIT_TRY(check_output(output.path));
+    if (!options_.reference.empty()) RELIT_TRY(check_output(options_.reference));
     RELIT_ASSIGN(prepared_, prepare_bake(options_));
     summarize();
     RELIT_TRY(trace());
-    RELIT_TRY(write());
-    return std::move(summary_);
+    std::vector<BakeSummary> summaries;
+    for (const Output& output : outputs()) {
+      RELIT_ASSIGN(BakeSummary summary, write(output, summaries.empty()));
+      summaries.push_back(std::move(summary));
+    }
+    return summaries;
   }
 
  private:
-  Status check_outputs() const;
+  struct Output {
+    std::filesystem::path path;
+    CodingOptions coding;
+  };
+  [[nodiscard]] std::vector<Output> outputs() const;
+  static Status check_output(const std::filesystem::path& path);
   void summarize();
   Status find_seams(BakePoser& poser, const TraceGeometry& geometry);
   Status trace();
-  Status write();
-  Result<RangeScan> scan_range(decoders::NpyWriter* reference);
+  Result<BakeSummary> write(const Output& output, bool with_reference);
+  Result<PlaneSplit> split_planes(const CodingOptions& coding);
+  Result<RangeScan> scan_range(const CodingOptions& options, decoders::NpyWriter* reference);
+  Result<TransferFrame> fill_frame(std::uint64_t frame);
   Status write_static(container::Writer& writer, const PlaneEncoder& encoder);
   Status write_segments(container::Writer& writer, PlaneEncoder& encoder);
   Result<decoders::NpyWriter> create_reference() const;
-  void fill_frame(std::uint64_t frame);
+  void fill_transfer(std::uint64_t frame);
 
   [[nodiscard]] std::size_t texels() const {
     return static_cast<std::size_t>(options_.transfer.width) *
@@ -71,16 +84,26 @@ class Bake {
   std::vector<std::vector<std::uint8_t>> buried_;  // by frame; empty where nothing is
   std::optional<PushPull> push_pull_;              // for frames in which nothing is buried
   std::optional<SeamStitcher> stitcher_;
-  std::vector<float> filled_;  // [coefficients][3][H][W] of the frame in hand
+  std::unique_ptr<BakeNormals> normals_;  // of models with a prediction
+  std::vector<float> filled_;             // [coefficients][3][H][W] of the frame in hand
   glm::vec3 bounds_min_{std::numeric_limits<float>::infinity()};
   glm::vec3 bounds_max_{-std::numeric_limits<float>::infinity()};
 };
 
+std::vector<Bake::Output> Bake::outputs() const {
+  if (options_.sweep.empty()) return {{options_.output, options_.coding}};
+  std::vector<Output> outputs;
+  for (const CodingVariant& variant : options_.sweep) {
+    std::filesystem::path path = options_.output;
+    path.replace_filename(path.stem().string() + "-" + variant.name + path.extension().string());
+    outputs.push_back({std::move(path), variant.coding});
+  }
+  return outputs;
+}
+
 // An output that cannot be written should be known before an hour of tracing, not after it.
-Status Bake::check_outputs() const {
-  RELIT_TRY(container::FileSink::create(options_.output.string()));
-  if (!options_.reference.empty())
-    RELIT_TRY(container::FileSink::create(options_.reference.string()));
+Status Bake::check_output(const std::filesystem::path& path) {
+  RELIT_TRY(container::FileSink::create(path.string()));
   return {};
 }
 
@@ -151,7 +174,7 @@ Status Bake::trace() {
 }
 
 // Spreads the samples of a frame over its map, fills the rest and closes the seams.
-void Bake::fill_frame(std::uint64_t frame) {
+void Bake::fill_transfer(std::uint64_t frame) {
   const std::vector<std::uint8_t>& buried = buried_[frame];
   std::optional<PushPull> own;
   if (!buried.empty() || !push_pull_) {
@@ -179,6 +202,15 @@ void Bake::fill_frame(std::uint64_t frame) {
     push_pull.fill(out);
     stitcher_->stitch(out);
   });
+}
+
+Result<TransferFrame> Bake::fill_frame(std::uint64_t frame) {
+  fill_transfer(frame);
+  TransferFrame filled{filled_};
+  if (normals_) {
+    RELIT_ASSIGN(filled.normals, normals_->at(frame));
+  }
+  return filled;
 }
 
 Status Bake::write_static(container::Writer& writer, const PlaneEncoder& encoder) {
@@ -226,45 +258,72 @@ Status Bake::write_segments(container::Writer& writer, PlaneEncoder& encoder) {
   return {};
 }
 
-// Measures what the planes have to hold, and writes the reference, if there is one, on the way.
-Result<RangeScan> Bake::scan_range(decoders::NpyWriter* reference) {
-  CodingOptions coding = options_.coding;
-  coding.segment_frames = static_cast<int>(prepared_.segment_frames);
-  coding.threads = thread_count(options_.transfer.threads);
+// Principal planes take a pass of their own over the clip.
+Result<PlaneSplit> Bake::split_planes(const CodingOptions& coding) {
   const TransferShape shape{options_.transfer.order, options_.transfer.width,
                             options_.transfer.height};
-  RELIT_ASSIGN(RangeScan scan, RangeScan::create(shape, coding));
+  if (coding.planes == Planes::kColour) return PlaneSplit::colour(shape, coding);
+  std::vector<std::uint8_t> known(texels(), 0), counted(texels(), 0);
+  for (const TexelSample& sample : prepared_.samples) {
+    known[sample.texel] = 1;
+    counted[sample.texel] = sample.covered ? 1 : 0;
+  }
+  if (coding.predict) {
+    RELIT_ASSIGN(normals_, BakeNormals::create(prepared_, shape.width, shape.height));
+    known = normals_->mask();
+  }
+  PrincipalAnalysis analysis(shape, coding.predict, std::move(counted));
+  progress_.start("analyse", prepared_.frames, "frame");
+  for (std::uint64_t k = 0; k < prepared_.frames; ++k) {
+    RELIT_ASSIGN(const TransferFrame frame, fill_frame(k));
+    RELIT_TRY(analysis.add_frame(frame));
+    progress_.advance(k + 1);
+  }
+  progress_.finish();
+  return PlaneSplit::principal(shape, analysis.finish(coding.principal_count), known);
+}
+
+// Measures what the planes have to hold, and writes the reference, if there is one, on the way.
+Result<RangeScan> Bake::scan_range(const CodingOptions& options, decoders::NpyWriter* reference) {
+  CodingOptions coding = options;
+  coding.segment_frames = static_cast<int>(prepared_.segment_frames);
+  coding.threads = thread_count(options_.transfer.threads);
+  RELIT_ASSIGN(coding, resolve(coding));
+  RELIT_ASSIGN(PlaneSplit split, split_planes(coding));
+  RELIT_ASSIGN(RangeScan scan, RangeScan::create(std::move(split), coding));
   progress_.start("measure", prepared_.frames, "frame");
   for (std::uint64_t k = 0; k < prepared_.frames; ++k) {
-    fill_frame(k);
-    RELIT_TRY(scan.add_frame(filled_));
-    if (reference != nullptr) RELIT_TRY(reference->write(std::span<const float>(filled_)));
+    RELIT_ASSIGN(const TransferFrame frame, fill_frame(k));
+    RELIT_TRY(scan.add_frame(frame));
+    if (reference != nullptr) RELIT_TRY(reference->write(frame.transfer));
     progress_.advance(k + 1);
   }
   progress_.finish();
   return scan;
 }
 
-Status Bake::write() {
+Result<BakeSummary> Bake::write(const Output& output, bool with_reference) {
   const Stopwatch watch;
+  const BakeSummary before = summary_;
+  normals_.reset();
   std::optional<decoders::NpyWriter> reference;
-  if (!options_.reference.empty()) {
+  if (with_reference && !options_.reference.empty()) {
     RELIT_ASSIGN(reference, create_reference());
   }
-  RELIT_ASSIGN(RangeScan scan, scan_range(reference ? &*reference : nullptr));
+  RELIT_ASSIGN(RangeScan scan, scan_range(output.coding, reference ? &*reference : nullptr));
   ModelIds ids;
   ids.clip_id = prepared_.pose.track.clip_id;
   ids.first_track_id = prepared_.pose.track.track_id + 1;
   RELIT_ASSIGN(PlaneEncoder encoder, PlaneEncoder::begin(std::move(scan), ids));
   summary_.decoder_bytes = encoder.decoder_bytes();
-  RELIT_ASSIGN(auto sink, container::FileSink::create(options_.output.string()));
+  RELIT_ASSIGN(auto sink, container::FileSink::create(output.path.string()));
   RELIT_ASSIGN(container::Writer writer,
                container::Writer::create(*sink, "relit-bake " RELIT_VERSION));
   RELIT_TRY(write_static(writer, encoder));
   progress_.start("code", prepared_.frames, "frame");
   for (std::uint64_t k = 0; k < prepared_.frames; ++k) {
-    fill_frame(k);
-    RELIT_TRY(encoder.encode_frame(filled_));
+    RELIT_ASSIGN(const TransferFrame frame, fill_frame(k));
+    RELIT_TRY(encoder.encode_frame(frame));
     RELIT_TRY(write_segments(writer, encoder));
     progress_.advance(k + 1);
   }
@@ -276,7 +335,8 @@ Status Bake::write() {
   RELIT_TRY(sink->commit());
   summary_.bytes = writer.bytes_written();
   summary_.code_s = watch.seconds();
-  return {};
+  summary_.output = output.path;
+  return std::exchange(summary_, before);
 }
 
 Result<decoders::NpyWriter> Bake::create_reference() const {
@@ -289,7 +349,7 @@ Result<decoders::NpyWriter> Bake::create_reference() const {
 
 }  // namespace
 
-Result<BakeSummary> bake(const BakeOptions& options, Progress& progress) {
+Result<std::vector<BakeSummary>> bake(const BakeOptions& options, Progress& progress) {
   return Bake(options, progress).run();
 }
 

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -15,9 +16,11 @@
 #include "bake_minimal/pose_encoder.hpp"
 #include "bake_minimal/progress.hpp"
 #include "bake_minimal/scene.hpp"
+#include "bake_minimal/sweep.hpp"
 #include "bake_minimal/transfer.hpp"
 #include "container/base/result.hpp"
 #include "decoders/pose.hpp"
+#include "decoders/texel_normals.hpp"
 
 /// From a glTF file to a .relit file: the baker as one call.
 namespace relit::bake {
@@ -35,12 +38,16 @@ struct BakeOptions {
   std::optional<GroundOptions> ground;
   TransferOptions transfer;  ///< its width and height are the light map's
   CodingOptions coding;      ///< segment_frames comes from segment_s
+  /// Where not empty, the clip is coded once for each of them in place of `coding`: into the
+  /// output's name with "-" and the variant's before its extension.
+  std::vector<CodingVariant> sweep{};
   PoseChoice pose = PoseChoice::kAuto;
   bool write_normals = false;
 };
 
 /// What a bake made, for people and for --json.
 struct BakeSummary {
+  std::filesystem::path output;
   std::string clip;
   std::uint64_t frames = 0;
   int order = 0, width = 0, height = 0;
@@ -107,9 +114,31 @@ class BakePoser {
   std::vector<glm::vec3> positions_, normals_, primitive_positions_, primitive_normals_;
 };
 
-/// Bakes. The output appears under its name when everything is done, and not at all otherwise; the
-/// same options give the same bytes for any number of threads. Errors name the file, the place and
-/// the remedy.
-[[nodiscard]] Result<BakeSummary> bake(const BakeOptions& options, Progress& progress);
+/// The normals of the light map's texels, frame by frame, as the player will have them.
+class BakeNormals {
+ public:
+  /// Errors: those of decoders::PoseTrack and decoders::TexelNormals.
+  static Result<std::unique_ptr<BakeNormals>> create(const PreparedBake& prepared, int width,
+                                                     int height);
+  /// [H][W]; valid until the next call. Errors: those of decoders::PoseTrack.
+  Result<std::span<const glm::vec3>> at(std::uint64_t frame);
+  /// [H][W], 1 where a texel has a normal.
+  [[nodiscard]] std::vector<std::uint8_t> mask() const;
+
+ private:
+  BakeNormals(std::vector<decoders::Mesh> meshes, decoders::PoseTrack track, std::size_t texels)
+      : meshes_(std::move(meshes)), track_(std::move(track)), out_(texels) {}
+
+  std::vector<decoders::Mesh> meshes_;  ///< as they are in the file
+  decoders::PoseTrack track_;
+  decoders::Pose pose_;
+  std::optional<decoders::TexelNormals> normals_;
+  std::vector<glm::vec3> out_;
+};
+
+/// Bakes: one file, or one for each variant of a sweep, of one trace. A file appears under its name
+/// when it is complete, and not at all otherwise; the same options give the same bytes for any
+/// number of threads. Errors name the file, the place and the remedy.
+[[nodiscard]] Result<std::vector<BakeSummary>> bake(const BakeOptions& options, Progress& progress);
 
 }  // namespace relit::bake

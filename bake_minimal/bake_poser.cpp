@@ -45,16 +45,26 @@ TraceGeometry trace_geometry(const PackedScene& packed) {
   return geometry;
 }
 
-Result<BakePoser> BakePoser::create(const PreparedBake& prepared) {
-  const PackedScene& packed = prepared.packed;
+namespace {
+
+Result<decoders::PoseTrack> pose_track(const PreparedBake& prepared,
+                                       std::span<const decoders::Mesh> meshes) {
   RELIT_ASSIGN(decoders::PoseTrack track,
-               decoders::PoseTrack::create(packed.skeleton, prepared.pose.track, packed.meshes));
+               decoders::PoseTrack::create(prepared.packed.skeleton, prepared.pose.track, meshes));
   for (std::size_t s = 0; s < prepared.pose.packets.size(); ++s) {
     const std::uint64_t first = s * std::uint64_t{prepared.segment_frames};
     const std::uint64_t count =
         std::min<std::uint64_t>(prepared.segment_frames, prepared.frames - first);
     RELIT_TRY(track.add_packet(prepared.pose.packets[s], first, static_cast<std::uint32_t>(count)));
   }
+  return track;
+}
+
+}  // namespace
+
+Result<BakePoser> BakePoser::create(const PreparedBake& prepared) {
+  const PackedScene& packed = prepared.packed;
+  RELIT_ASSIGN(decoders::PoseTrack track, pose_track(prepared, packed.meshes));
   BakePoser poser(prepared, std::move(track));
   std::size_t vertices = 0;
   for (const decoders::Mesh& mesh : packed.meshes) vertices += mesh.positions.size();
@@ -89,6 +99,35 @@ Status BakePoser::pose(std::uint64_t frame) {
     first += mesh.positions.size();
   }
   return {};
+}
+
+Result<std::unique_ptr<BakeNormals>> BakeNormals::create(const PreparedBake& prepared, int width,
+                                                         int height) {
+  const container::SkeletonRecord& skeleton = prepared.packed.skeleton;
+  std::vector<decoders::Mesh> meshes;
+  for (const container::MeshRecord& record : prepared.packed.mesh_records) {
+    RELIT_ASSIGN(decoders::Mesh mesh, decoders::decode_mesh(record, skeleton.palette.size(),
+                                                            skeleton.morph_weight_count));
+    meshes.push_back(std::move(mesh));
+  }
+  RELIT_ASSIGN(decoders::PoseTrack track, pose_track(prepared, meshes));
+  const auto texels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  std::unique_ptr<BakeNormals> normals(
+      new BakeNormals(std::move(meshes), std::move(track), texels));
+  RELIT_ASSIGN(normals->normals_, decoders::TexelNormals::create(normals->meshes_, width, height));
+  return normals;
+}
+
+Result<std::span<const glm::vec3>> BakeNormals::at(std::uint64_t frame) {
+  RELIT_TRY(track_.sample(static_cast<double>(frame), pose_));
+  normals_->compute(pose_, out_);
+  return std::span<const glm::vec3>(out_);
+}
+
+std::vector<std::uint8_t> BakeNormals::mask() const {
+  std::vector<std::uint8_t> mask(out_.size(), 0);
+  normals_->mark(mask);
+  return mask;
 }
 
 }  // namespace relit::bake

@@ -80,7 +80,16 @@ Status unwrap(const BakeOptions& options, PreparedBake& out) {
 Status pack(const BakeOptions& options, PreparedBake& out) {
   PackOptions pack_options;
   pack_options.clip = out.clip;
+  // What is predicted from normals is predicted from those in the file. A twentieth of a mesh, they
+  // save a fifth of the planes over what the triangles alone tell.
   pack_options.normals = options.write_normals;
+  std::vector<CodingOptions> codings{options.coding};
+  if (!options.sweep.empty()) codings.clear();
+  for (const CodingVariant& variant : options.sweep) codings.push_back(variant.coding);
+  for (const CodingOptions& each : codings) {
+    RELIT_ASSIGN(const CodingOptions coding, resolve(each));
+    pack_options.normals |= coding.planes == Planes::kPrincipal && coding.predict;
+  }
   RELIT_ASSIGN(out.packed, pack_scene(out.scene, pack_options));
   std::vector<double> times(out.frames);
   for (std::uint64_t k = 0; k < out.frames; ++k) times[k] = out.time_s(k);
@@ -96,8 +105,9 @@ Status pack(const BakeOptions& options, PreparedBake& out) {
 
 Status rasterize(const BakeOptions& options, PreparedBake& out) {
   const TraceGeometry geometry = trace_geometry(out.packed);
-  out.samples = rasterize_atlas(geometry.lightmap_uv, geometry.indices, options.transfer.width,
-                                options.transfer.height);
+  RELIT_ASSIGN(out.samples,
+               decoders::rasterize_atlas(geometry.lightmap_uv, geometry.indices,
+                                         options.transfer.width, options.transfer.height));
   if (!out.samples.empty()) return {};
   return fail(ErrorCode::kInvalid, options.input.string() +
                                        ": no texel of the light map lies on the surface; raise "

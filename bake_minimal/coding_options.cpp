@@ -23,6 +23,8 @@ struct CodecTraits {
   double crf_min, crf_max, crf_default;
 };
 
+constexpr double kPrincipalFiner = 6;
+
 constexpr std::array<CodecTraits, 6> kCodecs = {{
     {"h264", true, true, true, false, -12, 51, 24},
     {"hevc", true, true, true, false, 0, 51, 24},
@@ -33,6 +35,26 @@ constexpr std::array<CodecTraits, 6> kCodecs = {{
 }};
 
 Unexpected invalid(std::string message) { return fail(ErrorCode::kInvalid, std::move(message)); }
+
+Status choose_planes(CodingOptions& o, bool only_420) {
+  const bool other_chroma = o.chroma && *o.chroma != Chroma::kLuma;
+  const bool possible = !other_chroma && o.exponent_block == 0 && !only_420;
+  if (o.planes == Planes::kAuto) {
+    const bool natural = possible && !o.chroma && !o.lossless && o.layout == Layout::kLayered;
+    o.planes = natural ? Planes::kPrincipal : Planes::kColour;
+  }
+  if (o.planes == Planes::kColour) return {};
+  if (!possible) {
+    return invalid(
+        "--planes principal takes --chroma luma, --exponent-block 0 and a codec with it, "
+        "which mpeg4 is not");
+  }
+  if (o.principal_count < 0 || o.principal_count > 48) {
+    return invalid("principal planes are 1 to 48, or 0, not " + std::to_string(o.principal_count));
+  }
+  o.chroma = Chroma::kLuma;
+  return {};
+}
 
 Status check_numbers(const CodingOptions& o, const CodecTraits& codec) {
   if (*o.bit_depth != 8 && *o.bit_depth != 10) {
@@ -88,9 +110,13 @@ Result<CodingOptions> resolve(CodingOptions o) {
   if (o.lossless && !codec->lossless) {
     return invalid("--codec " + o.codec + " cannot be lossless; h264, hevc, vp9 and ffv1 can");
   }
+  RELIT_TRY(choose_planes(o, codec->only_420));
+  const bool given_no_crf = !o.crf && !o.lossless;
   if (!o.bit_depth) o.bit_depth = codec->ten_bits && o.exponent_block == 0 ? 10 : 8;
   if (!o.chroma) o.chroma = o.lossless ? Chroma::k444 : Chroma::k420;
   if (!o.crf || o.lossless) o.crf = codec->crf_default;
+  // Steps of principal planes are relative to s, whose range is wider than any colour's.
+  if (given_no_crf && o.planes == Planes::kPrincipal) o.crf = *o.crf - kPrincipalFiner;
   if (o.preset.empty()) {
     if (o.codec == "h264") o.preset = "veryslow";
     if (o.codec == "hevc") o.preset = "slow";

@@ -15,6 +15,12 @@ enum class Layout : std::uint8_t {
   kGrid,     ///< one layer, tile n at row ⌊n/(N+1)⌋, column n mod (N+1), as in Xu et al.
 };
 
+enum class Planes : std::uint8_t {
+  kAuto,       ///< principal wherever the other options allow it
+  kColour,     ///< the channels of each coefficient, or YCoCg of them
+  kPrincipal,  ///< the axes of what the mesh's normals do not predict: PrincipalPlanes
+};
+
 /// How the transfer is quantised and coded (design, section 4). What is left open takes the best
 /// value for the rest, see resolve().
 struct CodingOptions {
@@ -24,7 +30,8 @@ struct CodingOptions {
   /// Quality, in the units of x264's constant rate factor: lower is better, +6 doubles the step and
   /// about halves the bytes. -12..51 with h264 (below 0 only with 10 bits), 0..51 with hevc and
   /// mpeg4, 0..63 with vp9 and av1. MPEG-4's quantiser is the one of the same step, qscale =
-  /// 2^((crf-10)/6), rounded to 1..31. Default: 24; 22 for mpeg4.
+  /// 2^((crf-10)/6), rounded to 1..31. Default: 24; 22 for mpeg4;
+  /// 18 with principal planes.
   std::optional<double> crf;
 
   /// Mantissas are coded without loss; what remains is the quantiser's error, quantiser_bound().
@@ -33,6 +40,15 @@ struct CodingOptions {
 
   std::optional<int>
       bit_depth;  ///< of mantissas, 8 or 10. Default: 10; 8 for mpeg4 and with exponents
+
+  /// Principal planes take luma, no exponents and layers; with kAuto they are taken unless chroma,
+  /// exponents, the grid, lossless coding or a codec without luma is asked for.
+  Planes planes = Planes::kAuto;
+  /// Principal planes besides s, at most; 0: as many as leave less than 1e-5 of the composites'
+  /// mean square out, which is about 60 dB below their peaks.
+  int principal_count = 0;
+  /// Whether principal planes hold what s·A_l/π·Y(N) leaves, or all.
+  bool predict = true;
 
   /// 4:2:0 and 4:4:4 hold Y, Co, Cg (lossless: G, B, R); luma holds (R+G+B)/3 alone.
   /// Default: 4:2:0; lossless 4:4:4.
@@ -59,7 +75,7 @@ struct CodingOptions {
   std::uint64_t decode_memory = 0;
 
   /// Without exponents: the same quantisation step for all bands, instead of steps in inverse
-  /// proportion to the light that falls on the band (kLightRms).
+  /// proportion to the light that falls on the band (light_metric()).
   bool uniform_steps = false;
   /// Without exponents: the middle of each coefficient's range becomes the model's mean μ, so that
   /// the mantissas use their whole range.
@@ -68,10 +84,6 @@ struct CodingOptions {
   /// Layers encoded at once. The bytes do not depend on it.
   int threads = 1;
 };
-
-/// RMS of the windowed light in bands 0..3 over the sixteen standard lights
-/// (media/lights/standard_lights.json), per coefficient and channel.
-inline constexpr double kLightRms[4] = {3.5643, 1.5277, 1.2291, 0.6041};
 
 /// Xu et al., section 4: the order-N grid, mantissas of 8 bits through MPEG-4's 4:2:0, one exponent
 /// for every texel of every frame, through FFV1.

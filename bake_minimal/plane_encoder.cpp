@@ -75,22 +75,23 @@ VideoSettings exponent_settings(const LayerRecord& record, const RangeScan& scan
 PlaneEncoder::PlaneEncoder(RangeScan scan, const ModelIds& ids)
     : scan_(std::move(scan)),
       ids_(ids),
-      quantiser_(scan_.shape(), scan_.options()),
+      quantiser_(scan_.split().shape(), scan_.options()),
+      split_(scan_.split()),
       steps_(scan_.steps()) {
   model_.id = ids.model_id;
   model_.clip_id = ids.clip_id;
-  model_.order = static_cast<std::uint8_t>(scan_.shape().order);
-  model_.width = static_cast<std::uint16_t>(scan_.shape().width);
-  model_.height = static_cast<std::uint16_t>(scan_.shape().height);
+  model_.order = static_cast<std::uint8_t>(split_.shape().order);
+  model_.width = static_cast<std::uint16_t>(split_.shape().width);
+  model_.height = static_cast<std::uint16_t>(split_.shape().height);
   model_.mean = scan_.mean();
+  model_.prediction_plane = split_.prediction_plane();
 }
 
 Result<PlaneEncoder> PlaneEncoder::begin(RangeScan scan, const ModelIds& ids) {
   if (scan.frame_count() == 0) return fail(ErrorCode::kInvalid, "the clip has no frames");
   PlaneEncoder encoder(std::move(scan), ids);
-  const TransferShape& shape = encoder.scan_.shape();
   RELIT_ASSIGN(std::vector<LayerPlan> plans,
-               plan_layers(shape.order, shape.width, shape.height, encoder.scan_.options(),
+               plan_layers(encoder.split_, encoder.scan_.options(),
                            {ids.model_id, ids.first_layer_id, ids.first_track_id}));
   for (LayerPlan& plan : plans) {
     auto state = std::make_unique<LayerState>();
@@ -144,10 +145,10 @@ Status PlaneEncoder::count_pictures(const decoders::VideoFormat& format, int pic
 
 Status PlaneEncoder::open_layer(LayerState& layer, const Keeping& keeping) {
   LayerRecord& record = layer.plan.record;
-  const auto components = static_cast<std::size_t>(component_count(quantiser_.basis()));
+  const auto components = static_cast<std::size_t>(split_.components());
   for (std::size_t k = 0; k < record.planes.size(); ++k) {
-    const auto n = static_cast<std::size_t>(layer.plan.coefficients[k / components]);
-    record.planes[k].scale = static_cast<float>(steps_[n][k % components].scale);
+    const auto tile = static_cast<std::size_t>(layer.plan.tiles[k / components]);
+    record.planes[k].scale = static_cast<float>(steps_[tile][k % components].scale);
   }
   VideoSettings settings = mantissa_settings(record, scan_.options());
   settings.reference_frames = keeping.reference_frames;
@@ -167,26 +168,24 @@ Status PlaneEncoder::open_layer(LayerState& layer, const Keeping& keeping) {
   return {};
 }
 
-Status PlaneEncoder::encode_frame(std::span<const float> transfer) {
+Status PlaneEncoder::encode_frame(const TransferFrame& frame) {
   if (next_frame_ >= scan_.frame_count()) {
     return fail(ErrorCode::kInvalid, "more frames than the " + std::to_string(scan_.frame_count()) +
                                          " that were scanned");
   }
-  RELIT_TRY(check_transfer(scan_.shape(), transfer, next_frame_));
-  RELIT_TRY(for_each_layer([&](LayerState& layer) { return encode_layer(layer, transfer); }));
+  RELIT_TRY(split_.begin_frame(frame, next_frame_));
+  RELIT_TRY(for_each_layer([&](LayerState& layer) { return encode_layer(layer); }));
   ++next_frame_;
   return {};
 }
 
-Status PlaneEncoder::encode_layer(LayerState& layer, std::span<const float> transfer) {
+Status PlaneEncoder::encode_layer(LayerState& layer) {
   const bool first_of_segment =
       next_frame_ % static_cast<std::uint64_t>(scan_.options().segment_frames) == 0;
   const auto pts = static_cast<std::int64_t>(next_frame_);
   RELIT_TRY(layer.mantissas->begin_picture());
   if (layer.exponents) RELIT_TRY(layer.exponents->begin_picture());
-  for (std::size_t tile = 0; tile < layer.plan.coefficients.size(); ++tile) {
-    RELIT_TRY(quantise_tile(layer, tile, transfer));
-  }
+  for (std::size_t i = 0; i < layer.plan.tiles.size(); ++i) RELIT_TRY(quantise_tile(layer, i));
   RELIT_TRY(layer.mantissas->encode(pts, first_of_segment, layer.packets));
   RELIT_TRY(collect(layer.mantissa_track, layer.packets));
   if (layer.exponents && scan_.begins_hold(next_frame_)) {
@@ -196,35 +195,35 @@ Status PlaneEncoder::encode_layer(LayerState& layer, std::span<const float> tran
   return {};
 }
 
-Status PlaneEncoder::quantise_tile(LayerState& layer, std::size_t tile,
-                                   std::span<const float> transfer) {
+Status PlaneEncoder::quantise_tile(LayerState& layer, std::size_t place) {
   const LayerRecord& record = layer.plan.record;
-  const int n = layer.plan.coefficients[tile];
-  const int components = component_count(quantiser_.basis());
-  quantiser_.split(transfer, n, layer.components);
+  const int tile = layer.plan.tiles[place];
+  const int components = split_.components();
+  split_.split(tile, layer.components.full);
+  quantiser_.halve_chroma(layer.components);
   layer.block_exponents.clear();
   if (layer.exponents) {
-    const std::span<const std::uint8_t> held = scan_.held_exponents(next_frame_, n);
+    const std::span<const std::uint8_t> held = scan_.held_exponents(next_frame_, tile);
     layer.block_exponents.assign(held.begin(), held.end());
     if (held.empty()) {
       layer.block_exponents.resize(quantiser_.blocks());
       quantiser_.raise_exponents(layer.components, layer.block_exponents);
     }
     const container::Rect& rect =
-        record.planes[tile * static_cast<std::size_t>(components)].exponent_rect;
+        record.planes[place * static_cast<std::size_t>(components)].exponent_rect;
     layer.samples.assign(layer.block_exponents.begin(), layer.block_exponents.end());
     store({layer.samples, rect.width, rect.height, rect.x, rect.y, rect.width, rect.height},
           layer.exponents->target(0));
   }
   for (int c = 0; c < components; ++c) {
     const container::Rect& rect =
-        record.planes[tile * static_cast<std::size_t>(components) + static_cast<std::size_t>(c)]
+        record.planes[place * static_cast<std::size_t>(components) + static_cast<std::size_t>(c)]
             .mantissa_rect;
     const PlaneQuantiser::Step& step =
-        steps_[static_cast<std::size_t>(n)][static_cast<std::size_t>(c)];
+        steps_[static_cast<std::size_t>(tile)][static_cast<std::size_t>(c)];
     if (!quantiser_.quantise(layer.components, c, step, layer.block_exponents, layer.samples)) {
-      return fail(ErrorCode::kInvalid, "frame " + std::to_string(next_frame_) + ", coefficient " +
-                                           std::to_string(n) +
+      return fail(ErrorCode::kInvalid, "frame " + std::to_string(next_frame_) + ", tile " +
+                                           std::to_string(tile) +
                                            " exceeds its range: it is not the frame that was "
                                            "scanned");
     }

@@ -51,9 +51,9 @@ class PlaneEncoder {
   /// Bytes of the pictures that decoders of all layers hold together, padding included.
   [[nodiscard]] std::uint64_t decoder_bytes() const { return decoder_bytes_; }
 
-  /// The frames that `scan` has seen, in the same order; [coefficients][3][H][W].
-  /// Errors: those of check_transfer(); kInvalid when the frame exceeds the ranges scanned.
-  Status encode_frame(std::span<const float> transfer);
+  /// The frames that `scan` has seen, in the same order. Errors: those of
+  /// PlaneSplit::begin_frame(); kInvalid when the frame exceeds the ranges scanned.
+  Status encode_frame(const TransferFrame& frame);
   /// Errors: kInvalid when frames are missing.
   Status finish();
 
@@ -89,8 +89,8 @@ class PlaneEncoder {
   Status open_layers();
   Status count_pictures(const decoders::VideoFormat& format, int pictures);
   Status open_layer(LayerState& layer, const Keeping& keeping);
-  Status encode_layer(LayerState& layer, std::span<const float> transfer);
-  Status quantise_tile(LayerState& layer, std::size_t tile, std::span<const float> transfer);
+  Status encode_layer(LayerState& layer);
+  Status quantise_tile(LayerState& layer, std::size_t place);
   Status finish_layer(LayerState& layer) const;
   Status collect(Track& track, std::vector<CodedPacket>& packets) const;
   Status for_each_layer(const std::function<Status(LayerState&)>& run);
@@ -98,6 +98,7 @@ class PlaneEncoder {
   RangeScan scan_;
   ModelIds ids_;
   PlaneQuantiser quantiser_;
+  PlaneSplit split_;
   std::vector<std::vector<PlaneQuantiser::Step>> steps_;
   container::ModelRecord model_;
   std::vector<container::LayerRecord> layers_;

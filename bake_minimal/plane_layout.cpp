@@ -6,7 +6,6 @@
 #include <string>
 
 #include "container/base/limits.hpp"
-#include "decoders/sh.hpp"
 
 namespace relit::bake {
 namespace {
@@ -37,31 +36,19 @@ Tiling tiling_of(int tiles, int tile_width, Layout layout, int order) {
   return tiling;
 }
 
-std::vector<container::MatrixEntry> matrix_column(Basis basis, int coefficient, int component) {
-  std::array<double, 3> unit{};
-  unit[static_cast<std::size_t>(component)] = 1;
-  const std::array<double, 3> rgb = to_rgb(basis, unit);
-  std::vector<container::MatrixEntry> column;
-  for (std::size_t c = 0; c < 3; ++c) {
-    if (rgb[c] == 0) continue;
-    column.push_back({static_cast<std::uint8_t>(coefficient), static_cast<std::uint8_t>(c),
-                      static_cast<float>(rgb[c])});
-  }
-  return column;
-}
-
 Rect tile_rect(int index, const Tiling& tiling, int pitch_x, int pitch_y, int width, int height) {
   return {static_cast<std::uint16_t>(index % tiling.columns * pitch_x),
           static_cast<std::uint16_t>(index / tiling.columns * pitch_y),
           static_cast<std::uint16_t>(width), static_cast<std::uint16_t>(height)};
 }
 
-Result<LayerPlan> plan_layer(std::vector<int> coefficients, int order, int width, int height,
+Result<LayerPlan> plan_layer(const PlaneSplit& split, std::vector<int> tiles,
                              const CodingOptions& o) {
   LayerPlan plan;
   LayerRecord& record = plan.record;
+  const int width = split.shape().width, height = split.shape().height;
   const Tiling tiling =
-      tiling_of(static_cast<int>(coefficients.size()), padded_side(width), o.layout, order);
+      tiling_of(static_cast<int>(tiles.size()), padded_side(width), o.layout, split.shape().order);
   const int coded_width = tiling.columns * padded_side(width);
   const int coded_height = tiling.rows * padded_side(height);
   if (coded_width > static_cast<int>(limits::kVideoSide) ||
@@ -87,9 +74,8 @@ Result<LayerPlan> plan_layer(std::vector<int> coefficients, int order, int width
     record.exponent_height =
         static_cast<std::uint16_t>(std::max(tiling.rows * blocks_y, kLeastFfv1Side));
   }
-  const Basis basis = basis_of(o);
-  for (std::size_t i = 0; i < coefficients.size(); ++i) {
-    for (int c = 0; c < component_count(basis); ++c) {
+  for (std::size_t i = 0; i < tiles.size(); ++i) {
+    for (int c = 0; c < split.components(); ++c) {
       PlaneRecord plane;
       plane.component = static_cast<std::uint8_t>(c);
       plane.mantissa_rect = tile_rect(static_cast<int>(i), tiling, padded_side(width),
@@ -98,70 +84,35 @@ Result<LayerPlan> plan_layer(std::vector<int> coefficients, int order, int width
         plane.exponent_rect =
             tile_rect(static_cast<int>(i), tiling, blocks_x, blocks_y, blocks_x, blocks_y);
       }
-      plane.matrix = matrix_column(basis, coefficients[i], c);
+      plane.matrix = split.column(tiles[i], c);
       record.planes.push_back(std::move(plane));
     }
   }
-  plan.coefficients = std::move(coefficients);
+  plan.tiles = std::move(tiles);
   return plan;
 }
 
 }  // namespace
 
-Basis basis_of(const CodingOptions& o) {
-  if (*o.chroma == Chroma::kLuma) return Basis::kLuma;
-  return o.lossless ? Basis::kGbr : Basis::kYCoCg;
-}
-
-int component_count(Basis basis) { return basis == Basis::kLuma ? 1 : 3; }
-
-std::array<double, 3> to_components(Basis basis, const std::array<double, 3>& rgb) {
-  const auto [r, g, b] = rgb;
-  switch (basis) {
-    case Basis::kYCoCg:
-      return {(r + 2 * g + b) / 4, (r - b) / 2, (2 * g - r - b) / 4};
-    case Basis::kGbr:
-      return {g, b, r};
-    case Basis::kLuma:
-      return {(r + g + b) / 3, 0, 0};
-  }
-  return {};
-}
-
-std::array<double, 3> to_rgb(Basis basis, const std::array<double, 3>& components) {
-  const auto [x, y, z] = components;
-  switch (basis) {
-    case Basis::kYCoCg:
-      return {x + y - z, x + z, x - y - z};
-    case Basis::kGbr:
-      return {z, x, y};
-    case Basis::kLuma:
-      return {x, x, x};
-  }
-  return {};
-}
-
-Result<std::vector<LayerPlan>> plan_layers(int order, int width, int height,
-                                           const CodingOptions& resolved, const LayoutIds& ids) {
+Result<std::vector<LayerPlan>> plan_layers(const PlaneSplit& split, const CodingOptions& resolved,
+                                           const LayoutIds& ids) {
   const int side = static_cast<int>(limits::kLightMapSide);
-  if (order < 0 || order > static_cast<int>(limits::kShOrder)) {
-    return fail(ErrorCode::kInvalid, "--order is 0 to 3, not " + std::to_string(order));
+  const TransferShape& shape = split.shape();
+  if (shape.order < 0 || shape.order > static_cast<int>(limits::kShOrder)) {
+    return fail(ErrorCode::kInvalid, "--order is 0 to 3, not " + std::to_string(shape.order));
   }
-  if (width < 1 || height < 1 || width > side || height > side) {
+  if (shape.width < 1 || shape.height < 1 || shape.width > side || shape.height > side) {
     return fail(ErrorCode::kInvalid, "a light map has 1 to " + std::to_string(side) +
-                                         " texels a side, not " + std::to_string(width) + "x" +
-                                         std::to_string(height));
-  }
-  std::vector<std::vector<int>> groups(
-      resolved.layout == Layout::kGrid ? 1u : static_cast<std::size_t>(order) + 1);
-  for (int n = 0; n < decoders::coefficient_count(order); ++n) {
-    const int group = resolved.layout == Layout::kGrid ? 0 : decoders::band_of(n);
-    groups[static_cast<std::size_t>(group)].push_back(n);
+                                         " texels a side, not " + std::to_string(shape.width) +
+                                         "x" + std::to_string(shape.height));
   }
   std::vector<LayerPlan> plans;
   std::uint32_t track = ids.first_track_id;
-  for (std::vector<int>& group : groups) {
-    RELIT_ASSIGN(LayerPlan plan, plan_layer(std::move(group), order, width, height, resolved));
+  int tile = 0;
+  for (const int count : split.layer_tiles(resolved.layout == Layout::kGrid)) {
+    std::vector<int> tiles(static_cast<std::size_t>(count));
+    for (int& each : tiles) each = tile++;
+    RELIT_ASSIGN(LayerPlan plan, plan_layer(split, std::move(tiles), resolved));
     plan.record.id = ids.first_layer_id + static_cast<std::uint32_t>(plans.size());
     plan.record.model_id = ids.model_id;
     plan.record.mantissa_track = track++;

@@ -7,25 +7,12 @@
 #include <vector>
 
 #include "bake_minimal/coding_options.hpp"
+#include "bake_minimal/plane_split.hpp"
 #include "container/base/result.hpp"
 #include "container/records.hpp"
 
-/// Which planes a light-map model has, where they lie in which pictures, and their columns of M.
+/// Where the planes of a light-map model lie in which pictures.
 namespace relit::bake {
-
-/// The three planes, or one, into which the RGB of a coefficient turns.
-enum class Basis : std::uint8_t { kYCoCg, kGbr, kLuma };
-
-/// The basis of resolved options.
-[[nodiscard]] Basis basis_of(const CodingOptions& options);
-/// 3 or 1.
-[[nodiscard]] int component_count(Basis basis);
-
-/// Y = (R+2G+B)/4, Co = (R−B)/2, Cg = (2G−R−B)/4; G, B, R; or (R+G+B)/3, which is the least squares
-/// best where all channels count alike, as they do under white light. Exact inverse of the columns
-/// of M where there is one: R = Y+Co−Cg, G = Y+Cg, B = Y−Co−Cg.
-[[nodiscard]] std::array<double, 3> to_components(Basis basis, const std::array<double, 3>& rgb);
-[[nodiscard]] std::array<double, 3> to_rgb(Basis basis, const std::array<double, 3>& components);
 
 /// A picture's side in whole macroblocks of 16 pixels.
 [[nodiscard]] constexpr int padded_side(int side) { return (side + 15) & ~15; }
@@ -33,7 +20,7 @@ enum class Basis : std::uint8_t { kYCoCg, kGbr, kLuma };
 /// One layer before it is coded. `record` lacks scales and private data of the codecs.
 struct LayerPlan {
   container::LayerRecord record;
-  std::vector<int> coefficients;  ///< planes [i·components, (i+1)·components) show coefficients[i]
+  std::vector<int> tiles;  ///< planes [i·components, (i+1)·components) are those of tiles[i]
 };
 
 struct LayoutIds {
@@ -42,10 +29,10 @@ struct LayoutIds {
   std::uint32_t first_track_id = 0;  ///< a layer takes one, or two with exponents, in order
 };
 
-/// Lays the planes of an order-N model out: tiles of the light map's size, padded to multiples of
-/// 16, in rows (as long as 2048 samples allow) by band, or as the grid. Deterministic. Errors:
-/// kLimit when a picture would be too large, kInvalid for a bad order or size.
-[[nodiscard]] Result<std::vector<LayerPlan>> plan_layers(int order, int width, int height,
+/// Lays the planes of a model out: tiles of the light map's size, padded to multiples of 16, in
+/// rows (as long as 2048 samples allow) by layer, or as the grid. Deterministic. Errors: kLimit
+/// when a picture would be too large, kInvalid for a bad order or size.
+[[nodiscard]] Result<std::vector<LayerPlan>> plan_layers(const PlaneSplit& split,
                                                          const CodingOptions& resolved,
                                                          const LayoutIds& ids);
 

@@ -5,9 +5,9 @@
 #include <array>
 #include <cfloat>
 #include <cmath>
-#include <string>
+#include <utility>
 
-#include "decoders/sh.hpp"
+#include "bake_minimal/plane_layout.hpp"
 
 namespace relit::bake {
 namespace {
@@ -25,38 +25,10 @@ std::uint8_t least_exponent(double largest, int bit_depth) {
       std::clamp(shift + exponent_zero(bit_depth), exponent_least(bit_depth), 255));
 }
 
-std::string place(std::uint64_t frame, std::size_t index, const TransferShape& shape) {
-  const std::size_t texel = index % shape.texels();
-  const std::size_t plane = index / shape.texels();
-  const auto width = static_cast<std::size_t>(shape.width);
-  return "frame " + std::to_string(frame) + ", coefficient " + std::to_string(plane / 3) +
-         ", channel " + std::to_string(plane % 3) + ", texel (" + std::to_string(texel % width) +
-         ", " + std::to_string(texel / width) + ")";
-}
-
 }  // namespace
-
-Status check_transfer(const TransferShape& shape, std::span<const float> transfer,
-                      std::uint64_t frame) {
-  const std::size_t expected = static_cast<std::size_t>(shape.coefficients()) * 3 * shape.texels();
-  if (transfer.size() != expected) {
-    return fail(ErrorCode::kInvalid, "frame " + std::to_string(frame) + " has " +
-                                         std::to_string(transfer.size()) + " values, expected " +
-                                         std::to_string(expected));
-  }
-  // The negated comparison also catches NaN.
-  const auto bad = std::find_if(transfer.begin(), transfer.end(),
-                                [](float v) { return !(std::abs(v) <= kLargestTransfer); });
-  if (bad == transfer.end()) return {};
-  return fail(ErrorCode::kInvalid,
-              place(frame, static_cast<std::size_t>(bad - transfer.begin()), shape) +
-                  ": transfer is " + std::to_string(*bad) +
-                  ", it has to be finite and at most 1e37 in magnitude");
-}
 
 PlaneQuantiser::PlaneQuantiser(const TransferShape& shape, const CodingOptions& o)
     : shape_(shape),
-      basis_(basis_of(o)),
       halves_(*o.chroma == container::Chroma::k420),
       bit_depth_(*o.bit_depth),
       block_(std::max(o.exponent_block, 1)),
@@ -70,20 +42,10 @@ std::size_t PlaneQuantiser::block_of(int x, int y) const {
   return static_cast<std::size_t>(y / block_ * blocks_x() + x / block_);
 }
 
-void PlaneQuantiser::split(std::span<const float> transfer, int n, Components& out) const {
-  const std::size_t texels = shape_.texels();
-  const float* r = transfer.data() + static_cast<std::size_t>(n) * 3 * texels;
-  const float* g = r + texels;
-  const float* b = g + texels;
-  const auto components = static_cast<std::size_t>(component_count(basis_));
-  out.full.resize(components);
-  out.half.resize(components);
-  for (auto& plane : out.full) plane.resize(texels);
-  for (std::size_t p = 0; p < texels; ++p) {
-    const std::array<double, 3> value = to_components(basis_, {r[p], g[p], b[p]});
-    for (std::size_t c = 0; c < components; ++c) out.full[c][p] = value[c];
-  }
-  for (std::size_t c = 1; c < components && halves_; ++c) halve(out.full[c], out.half[c]);
+void PlaneQuantiser::halve_chroma(Components& components) const {
+  components.half.resize(components.full.size());
+  for (std::size_t c = 1; c < components.full.size() && halves_; ++c)
+    halve(components.full[c], components.half[c]);
 }
 
 void PlaneQuantiser::halve(const std::vector<double>& full, std::vector<double>& half) const {
@@ -154,39 +116,43 @@ bool PlaneQuantiser::quantise(const Components& components, int component, const
   return fits;
 }
 
-RangeScan::RangeScan(const TransferShape& shape, const CodingOptions& resolved)
-    : shape_(shape),
+RangeScan::RangeScan(PlaneSplit split, const CodingOptions& resolved)
+    : split_(std::move(split)),
       options_(resolved),
-      quantiser_(shape, resolved),
-      ranges_(static_cast<std::size_t>(shape.coefficients()),
-              std::vector<Range>(static_cast<std::size_t>(component_count(basis_of(resolved))))) {}
+      quantiser_(split_.shape(), resolved),
+      ranges_(static_cast<std::size_t>(split_.tiles())) {}
 
-Result<RangeScan> RangeScan::create(const TransferShape& shape, const CodingOptions& options) {
+Result<RangeScan> RangeScan::create(PlaneSplit split, const CodingOptions& options) {
   RELIT_ASSIGN(const CodingOptions resolved, resolve(options));
-  RELIT_TRY(plan_layers(shape.order, shape.width, shape.height, resolved, {}));
-  return RangeScan(shape, resolved);
+  RELIT_TRY(plan_layers(split, resolved, {}));
+  return RangeScan(std::move(split), resolved);
 }
 
-Status RangeScan::add_frame(std::span<const float> transfer) {
-  RELIT_TRY(check_transfer(shape_, transfer, frame_count_));
+Result<RangeScan> RangeScan::create(const TransferShape& shape, const CodingOptions& options) {
+  CodingOptions colour = options;
+  colour.planes = Planes::kColour;
+  RELIT_ASSIGN(const CodingOptions resolved, resolve(colour));
+  return create(PlaneSplit::colour(shape, resolved), resolved);
+}
+
+Status RangeScan::add_frame(const TransferFrame& frame) {
+  RELIT_TRY(split_.begin_frame(frame, frame_count_));
   const bool held = options_.exponent_block > 0 && hold_frames() > 1;
-  if (held && begins_hold(frame_count_)) {
-    exponents_.emplace_back(static_cast<std::size_t>(shape_.coefficients()) * quantiser_.blocks());
-  }
-  for (int n = 0; n < shape_.coefficients(); ++n) {
-    quantiser_.split(transfer, n, scratch_);
+  const std::size_t blocks = quantiser_.blocks();
+  if (held && begins_hold(frame_count_)) exponents_.emplace_back(ranges_.size() * blocks);
+  for (std::size_t tile = 0; tile < ranges_.size(); ++tile) {
+    split_.split(static_cast<int>(tile), scratch_.full);
+    quantiser_.halve_chroma(scratch_);
     if (held) {
-      quantiser_.raise_exponents(
-          scratch_,
-          std::span(exponents_.back())
-              .subspan(static_cast<std::size_t>(n) * quantiser_.blocks(), quantiser_.blocks()));
+      quantiser_.raise_exponents(scratch_,
+                                 std::span(exponents_.back()).subspan(tile * blocks, blocks));
     }
     if (options_.exponent_block > 0) continue;
     for (std::size_t c = 0; c < scratch_.full.size(); ++c) {
       const std::vector<double>& values =
           quantiser_.halved(static_cast<int>(c)) ? scratch_.half[c] : scratch_.full[c];
       const auto [least, most] = std::minmax_element(values.begin(), values.end());
-      Range& range = ranges_[static_cast<std::size_t>(n)][c];
+      Range& range = ranges_[tile][c];
       range.least = frame_count_ == 0 ? *least : std::min(range.least, *least);
       range.most = frame_count_ == 0 ? *most : std::max(range.most, *most);
     }
@@ -195,43 +161,40 @@ Status RangeScan::add_frame(std::span<const float> transfer) {
   return {};
 }
 
-std::vector<Rgb> RangeScan::mean() const {
-  std::vector<Rgb> mean(ranges_.size());
-  if (options_.exponent_block > 0 || !options_.centred) return mean;
-  for (std::size_t n = 0; n < ranges_.size(); ++n) {
-    std::array<double, 3> middle{};
-    for (std::size_t c = 0; c < ranges_[n].size(); ++c) {
-      middle[c] = (ranges_[n][c].least + ranges_[n][c].most) / 2;
-    }
-    const std::array<double, 3> rgb = to_rgb(quantiser_.basis(), middle);
-    for (std::size_t c = 0; c < 3; ++c) mean[n][c] = static_cast<float>(rgb[c]);
+std::vector<std::array<double, 3>> RangeScan::wanted_middles() const {
+  std::vector<std::array<double, 3>> middles(ranges_.size());
+  if (options_.exponent_block > 0 || !options_.centred) return middles;
+  for (std::size_t tile = 0; tile < ranges_.size(); ++tile) {
+    if (!split_.centred(static_cast<int>(tile))) continue;
+    for (std::size_t c = 0; c < 3; ++c)
+      middles[tile][c] = (ranges_[tile][c].least + ranges_[tile][c].most) / 2;
   }
-  return mean;
+  return middles;
 }
 
+std::vector<Rgb> RangeScan::mean() const { return split_.mean(wanted_middles()); }
+
 std::vector<std::vector<PlaneQuantiser::Step>> RangeScan::steps() const {
-  std::vector<std::vector<PlaneQuantiser::Step>> steps(ranges_.size());
-  const std::vector<Rgb> means = mean();
+  const auto components = static_cast<std::size_t>(split_.components());
+  std::vector<std::vector<PlaneQuantiser::Step>> steps(
+      ranges_.size(), std::vector<PlaneQuantiser::Step>(components));
+  if (options_.exponent_block > 0) return steps;
+  // The mean as it is written, in float, so that rounding it costs no accuracy.
+  const std::vector<std::array<double, 3>> middles = split_.middles(wanted_middles(), mean());
   double unit = 0;
-  for (std::size_t n = 0; n < ranges_.size(); ++n) {
-    steps[n].resize(ranges_[n].size());
-    if (options_.exponent_block > 0) continue;
-    const double weight =
-        options_.uniform_steps ? 1 : kLightRms[decoders::band_of(static_cast<int>(n))];
-    // The mean as it is written, in float, so that rounding it costs no accuracy.
-    const std::array<double, 3> middle =
-        to_components(quantiser_.basis(), {means[n][0], means[n][1], means[n][2]});
-    for (std::size_t c = 0; c < steps[n].size(); ++c) {
-      steps[n][c] = {middle[c], 1 / weight};
-      const double reach = std::max(std::abs(ranges_[n][c].most - middle[c]),
-                                    std::abs(ranges_[n][c].least - middle[c]));
+  for (std::size_t tile = 0; tile < ranges_.size(); ++tile) {
+    const double weight = options_.uniform_steps ? 1 : split_.weight(static_cast<int>(tile));
+    for (std::size_t c = 0; c < components; ++c) {
+      const Range& range = ranges_[tile][c];
+      steps[tile][c] = {middles[tile][c], 1 / weight};
+      const double reach = std::max(std::abs(range.most - middles[tile][c]),
+                                    std::abs(range.least - middles[tile][c]));
       unit = std::max(unit, reach * weight / mantissa_top(*options_.bit_depth));
     }
   }
-  if (options_.exponent_block > 0) return steps;
   if (unit == 0) unit = 1;
-  for (auto& coefficient : steps) {
-    for (PlaneQuantiser::Step& step : coefficient) {
+  for (auto& tile : steps) {
+    for (PlaneQuantiser::Step& step : tile) {
       step.scale = std::max(static_cast<float>(step.scale * unit), FLT_MIN);
     }
   }
@@ -255,10 +218,10 @@ std::size_t RangeScan::hold_index(std::uint64_t frame) const {
   return static_cast<std::size_t>(frame / segment * holds_a_segment + frame % segment / hold);
 }
 
-std::span<const std::uint8_t> RangeScan::held_exponents(std::uint64_t frame, int n) const {
+std::span<const std::uint8_t> RangeScan::held_exponents(std::uint64_t frame, int tile) const {
   if (options_.exponent_block == 0 || hold_frames() == 1) return {};
   return std::span(exponents_[hold_index(frame)])
-      .subspan(static_cast<std::size_t>(n) * quantiser_.blocks(), quantiser_.blocks());
+      .subspan(static_cast<std::size_t>(tile) * quantiser_.blocks(), quantiser_.blocks());
 }
 
 }  // namespace relit::bake

@@ -1,50 +1,31 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
 
 #include "bake_minimal/coding_options.hpp"
-#include "bake_minimal/plane_layout.hpp"
+#include "bake_minimal/plane_split.hpp"
 #include "container/base/plane_view.hpp"
 #include "container/base/result.hpp"
 
-/// Transfer -> values of planes -> exponents and mantissas (design, section 4, step 2).
+/// Values of planes -> exponents and mantissas (design, section 4, step 2).
 namespace relit::bake {
 
-/// Transfer beyond this is refused: everything decoded from it stays finite in float.
-inline constexpr float kLargestTransfer = 1e37f;
-
-struct TransferShape {
-  int order = 2;
-  int width = 0;
-  int height = 0;
-  [[nodiscard]] int coefficients() const { return (order + 1) * (order + 1); }
-  [[nodiscard]] std::size_t texels() const {
-    return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
-  }
-};
-
-/// Errors: kInvalid for a wrong size, and for a value that is not finite or beyond
-/// kLargestTransfer, naming frame, coefficient, channel and texel. `transfer` is
-/// [coefficients][3][H][W].
-Status check_transfer(const TransferShape& shape, std::span<const float> transfer,
-                      std::uint64_t frame);
-
-/// The planes of one coefficient in one frame, [component][texels]; memory is reused.
+/// The planes of one tile in one frame, [component][texels]; memory is reused.
 struct Components {
   std::vector<std::vector<double>> full;  ///< at full resolution
   std::vector<std::vector<double>> half;  ///< means of 2×2, of components 1 and 2; only with 4:2:0
 };
 
-/// Turns options and a shape into values, exponents and mantissas. Immutable after construction, so
-/// that it may be shared by threads.
+/// Turns values into exponents and mantissas. Immutable after construction, so that it may be
+/// shared by threads.
 class PlaneQuantiser {
  public:
   PlaneQuantiser(const TransferShape& shape, const CodingOptions& resolved);
 
-  [[nodiscard]] Basis basis() const { return basis_; }
   [[nodiscard]] bool halved(int component) const { return halves_ && component > 0; }
   [[nodiscard]] int blocks_x() const { return (shape_.width + block_ - 1) / block_; }
   [[nodiscard]] int blocks_y() const { return (shape_.height + block_ - 1) / block_; }
@@ -52,9 +33,8 @@ class PlaneQuantiser {
     return static_cast<std::size_t>(blocks_x()) * static_cast<std::size_t>(blocks_y());
   }
 
-  /// Values of the planes of coefficient `n`; 2×2 means replicate the last column and row of odd
-  /// maps.
-  void split(std::span<const float> transfer, int n, Components& out) const;
+  /// Fills `half` from `full`; the last column and row of odd maps are replicated.
+  void halve_chroma(Components& components) const;
 
   /// Raises `exponents` (one for each block, row-major) to the least E with which every mantissa of
   /// the block is within ±mantissa_top(): over all full-resolution planes and, for blocks of at
@@ -80,7 +60,6 @@ class PlaneQuantiser {
                     std::vector<double>& half) const;
 
   TransferShape shape_;
-  Basis basis_;
   bool halves_;
   int bit_depth_;
   int block_;
@@ -91,44 +70,46 @@ class PlaneQuantiser {
 class RangeScan {
  public:
   /// Errors: those of resolve() and plan_layers().
+  static Result<RangeScan> create(PlaneSplit split, const CodingOptions& options);
+  /// Of colour planes.
   static Result<RangeScan> create(const TransferShape& shape, const CodingOptions& options);
 
-  /// Frames in order; `transfer` is [coefficients][3][H][W], filled outside the charts.
-  /// Errors: those of check_transfer().
-  Status add_frame(std::span<const float> transfer);
+  /// Frames in order, filled outside the charts. Errors: those of PlaneSplit::begin_frame().
+  Status add_frame(const TransferFrame& frame);
 
   [[nodiscard]] std::uint64_t frame_count() const { return frame_count_; }
-  [[nodiscard]] const TransferShape& shape() const { return shape_; }
+  [[nodiscard]] const PlaneSplit& split() const { return split_; }
   [[nodiscard]] const CodingOptions& options() const { return options_; }
 
   /// μ[n]: the middles of the ranges where options.centred and there are no exponents, else zero.
   [[nodiscard]] std::vector<Rgb> mean() const;
-  /// Step of every plane, [coefficient][component], for that mean. With exponents the scale is 1.
-  /// Without, scales are in inverse proportion to kLightRms (or equal), and the largest |value| of
-  /// the clip just fits. Always finite and positive, also for a clip of zeros.
+  /// Step of every plane, [tile][component], for that mean. With exponents the scale is 1. Without,
+  /// scales are in inverse proportion to PlaneSplit::weight() (or equal), and the largest |value|
+  /// of the clip just fits. Always finite and positive, also for a clip of zeros.
   [[nodiscard]] std::vector<std::vector<PlaneQuantiser::Step>> steps() const;
 
   /// Frames that share one exponent picture, and whether frame k begins such a run.
   [[nodiscard]] int hold_frames() const;
   [[nodiscard]] bool begins_hold(std::uint64_t frame) const;
-  /// Exponents of a coefficient at a frame, [blocks]; empty unless exponents are held over frames.
-  [[nodiscard]] std::span<const std::uint8_t> held_exponents(std::uint64_t frame, int n) const;
+  /// Exponents of a tile at a frame, [blocks]; empty unless exponents are held over frames.
+  [[nodiscard]] std::span<const std::uint8_t> held_exponents(std::uint64_t frame, int tile) const;
 
  private:
   struct Range {
     double least = 0;
     double most = 0;
   };
-  RangeScan(const TransferShape& shape, const CodingOptions& resolved);
+  RangeScan(PlaneSplit split, const CodingOptions& resolved);
+  [[nodiscard]] std::vector<std::array<double, 3>> wanted_middles() const;
   [[nodiscard]] std::size_t hold_index(std::uint64_t frame) const;
 
-  TransferShape shape_;
+  PlaneSplit split_;
   CodingOptions options_;
   PlaneQuantiser quantiser_;
   Components scratch_;
   std::uint64_t frame_count_ = 0;
-  std::vector<std::vector<Range>> ranges_;            ///< [coefficient][component]
-  std::vector<std::vector<std::uint8_t>> exponents_;  ///< [hold][coefficient × blocks]
+  std::vector<std::array<Range, 3>> ranges_;          ///< [tile][component]
+  std::vector<std::vector<std::uint8_t>> exponents_;  ///< [hold][tile × blocks]
 };
 
 }  // namespace relit::bake

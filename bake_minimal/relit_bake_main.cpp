@@ -30,12 +30,13 @@ Exit status: 0 success, 1 the input is bad, 2 usage or environment.)";
 struct Arguments {
   BakeOptions bake;
   std::string clip, lightmap_uv = "auto", layout = "layered", preset, chroma, model = "shlm",
-                    pose = "auto", fps = "50";
+                    planes = "auto", sweep, pose = "auto", fps = "50";
   std::vector<int> size{128};
   double crf = 0, ground_radius = 0;
   int bit_depth = 0;
   std::vector<float> ground_color;
-  bool list_clips = false, json = false, quiet = false, once = false, ground = false;
+  bool list_clips = false, json = false, quiet = false, once = false, ground = false,
+       no_prediction = false;
 };
 
 int report(const Error& error) {
@@ -136,6 +137,19 @@ void add_options(CLI::App& app, Arguments& a) {
   app.add_option("--chroma", a.chroma, "420, 444 or luma")
       ->check(CLI::IsMember({"420", "444", "luma"}))
       ->group("Coding");
+  app.add_option("--planes", a.planes,
+                 "what the planes are: colour (the channels of each coefficient), principal (the "
+                 "axes of what the mesh's normals do not predict), auto")
+      ->check(CLI::IsMember({"auto", "colour", "principal"}))
+      ->capture_default_str()
+      ->group("Coding");
+  app.add_option("--principal-count", a.bake.coding.principal_count,
+                 "principal planes at most; 0: all that show")
+      ->capture_default_str()
+      ->group("Coding");
+  app.add_flag("--no-prediction", a.no_prediction,
+               "principal planes of all of the transfer, the normals aside")
+      ->group("Coding");
   app.add_option(
          "--exponent-block", a.bake.coding.exponent_block,
          "side of the square of texels that shares an exponent: 1 to 32, a power of two; 0: none")
@@ -164,9 +178,13 @@ void add_options(CLI::App& app, Arguments& a) {
       ->capture_default_str()
       ->group("Coding");
   app.add_flag("--normals", a.bake.write_normals,
-               "write the normals, for hosts that shade for themselves")
+               "write the normals, for hosts that shade for themselves, in any case")
       ->group("Coding");
 
+  app.add_option("--sweep", a.sweep,
+                 "code one trace in several ways, such as \"codec=h264,hevc crf=12,18,24\": "
+                 "OUT-h264-crf12.relit and so on")
+      ->group("Coding");
   app.add_option("--reference", a.bake.reference,
                  "write the unquantised bake as .npy, float32 [frames][coefficients][3][H][W]");
   app.add_flag("--json", a.json, "print a summary to standard output");
@@ -203,11 +221,17 @@ Status complete(Arguments& a, const CLI::App& app) {
     bake.coding.decode_memory = given.decode_memory;
   }
   if (a.layout == "grid" && a.preset.empty()) bake.coding.layout = Layout::kGrid;
+  if (a.planes == "colour") bake.coding.planes = Planes::kColour;
+  if (a.planes == "principal") bake.coding.planes = Planes::kPrincipal;
+  if (a.no_prediction) bake.coding.predict = false;
   if (app.count("--crf") > 0) bake.coding.crf = a.crf;
   if (a.bit_depth != 0) bake.coding.bit_depth = a.bit_depth;
   if (a.chroma == "420") bake.coding.chroma = container::Chroma::k420;
   if (a.chroma == "444") bake.coding.chroma = container::Chroma::k444;
   if (a.chroma == "luma") bake.coding.chroma = container::Chroma::kLuma;
+  if (!a.sweep.empty()) {
+    RELIT_ASSIGN(bake.sweep, expand_sweep(a.sweep, bake.coding));
+  }
   bake.pose = a.pose == "joints"     ? PoseChoice::kJoints
               : a.pose == "vertices" ? PoseChoice::kVertices
                                      : PoseChoice::kAuto;
@@ -224,9 +248,9 @@ int list_clips(const std::filesystem::path& input) {
   return 0;
 }
 
-void print_json(const BakeSummary& s, const BakeOptions& options) {
+nlohmann::ordered_json summary_json(const BakeSummary& s, const BakeOptions& options) {
   nlohmann::ordered_json json;
-  json["output"] = options.output.string();
+  json["output"] = s.output.string();
   json["clip"] = s.clip;
   json["frames"] = s.frames;
   json["fps"] = {options.frame_rate.num, options.frame_rate.den};
@@ -248,13 +272,21 @@ void print_json(const BakeSummary& s, const BakeOptions& options) {
                    {"meshes", s.mesh_bytes}, {"pose", s.pose_bytes},
                    {"video", s.video_bytes}, {"decoder_pictures", s.decoder_bytes}};
   json["warnings"] = s.warnings;
+  return json;
+}
+
+/// An object, or for a sweep a list of them.
+void print_json(const std::vector<BakeSummary>& summaries, const BakeOptions& options) {
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  for (const BakeSummary& summary : summaries) json.push_back(summary_json(summary, options));
+  if (options.sweep.empty()) json = nlohmann::ordered_json(json.front());
   std::printf("%s\n", json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
 }
 
-void print_summary(const BakeSummary& s, const BakeOptions& options) {
+void print_summary(const BakeSummary& s) {
   std::fprintf(stderr, "%s: %s, %llu frames, order %d, %dx%d; %s, %d charts, %.0f %% covered\n",
-               options.output.c_str(), s.clip.c_str(), static_cast<unsigned long long>(s.frames),
-               s.order, s.width, s.height,
+               s.output.c_str(), s.clip.c_str(), static_cast<unsigned long long>(s.frames), s.order,
+               s.width, s.height,
                s.atlas.set < 0 ? "unwrapped" : ("UV set " + std::to_string(s.atlas.set)).c_str(),
                s.atlas.charts, 100 * s.atlas.coverage);
   std::fprintf(
@@ -283,11 +315,12 @@ int main(int argc, char** argv) {
   }
   if (const Status status = complete(arguments, app); !status) return report(status.error());
   Progress progress(arguments.quiet);
-  const Result<BakeSummary> summary = bake::bake(arguments.bake, progress);
-  if (!summary) return report(summary.error());
-  for (const std::string& warning : summary->warnings)
+  const Result<std::vector<BakeSummary>> summaries = bake::bake(arguments.bake, progress);
+  if (!summaries) return report(summaries.error());
+  for (const std::string& warning : summaries->front().warnings)
     std::fprintf(stderr, "relit-bake: warning: %s\n", warning.c_str());
-  if (!arguments.quiet) print_summary(*summary, arguments.bake);
-  if (arguments.json) print_json(*summary, arguments.bake);
+  for (const BakeSummary& summary : *summaries)
+    if (!arguments.quiet) print_summary(summary);
+  if (arguments.json) print_json(*summaries, arguments.bake);
   return 0;
 }

@@ -10,8 +10,8 @@
 #include <queue>
 #include <tuple>
 
-#include "bake_minimal/texel_raster.hpp"
 #include "bake_minimal/unwrap_charts.hpp"
+#include "decoders/texel_raster.hpp"
 
 namespace relit::bake {
 namespace {
@@ -248,8 +248,8 @@ std::vector<bool> self_overlapping(std::span<const FlatChart> charts, std::span<
   for (std::uint32_t c = 0; c < charts.size(); ++c) {
     for (const std::uint32_t t : charts[c].triangles) {
       const std::size_t k = 3 * static_cast<std::size_t>(t);
-      FixedTriangle(uv[k], uv[k + 1], uv[k + 2], options.width, options.height)
-          .for_each_row(options.width, options.height, [&](int y, int x0, int x1) {
+      decoders::FixedTriangle(uv[k], uv[k + 1], uv[k + 2], options.width, options.height)
+          .for_each_row(0, options.height, options.width, [&](int y, int x0, int x1) {
             for (int x = x0; x <= x1; ++x) {
               auto& o =
                   owner[static_cast<std::size_t>(y) * static_cast<std::size_t>(options.width) +

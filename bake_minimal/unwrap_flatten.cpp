@@ -8,8 +8,8 @@
 #include <unordered_map>
 
 #include "bake_minimal/cross2.hpp"
-#include "bake_minimal/texel_raster.hpp"
 #include "bake_minimal/unwrap_conformal.hpp"
+#include "decoders/texel_raster.hpp"
 
 namespace relit::bake {
 namespace {
@@ -306,8 +306,8 @@ class Flattener {
                                     static_cast<std::size_t>(side));
     for (const auto& tri : mesh_.triangles) {
       bool twice = false;
-      FixedTriangle(uv[tri[0]], uv[tri[1]], uv[tri[2]], side, side)
-          .for_each_row(side, side, [&](int y, int x0, int x1) {
+      decoders::FixedTriangle(uv[tri[0]], uv[tri[1]], uv[tri[2]], side, side)
+          .for_each_row(0, side, side, [&](int y, int x0, int x1) {
             for (int x = x0; x <= x1; ++x) {
               std::uint8_t& cell = taken[static_cast<std::size_t>(y * side + x)];
               twice = twice || cell != 0;

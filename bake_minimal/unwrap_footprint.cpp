@@ -6,7 +6,7 @@
 #include <map>
 
 #include "bake_minimal/cross2.hpp"
-#include "bake_minimal/texel_raster.hpp"
+#include "decoders/texel_raster.hpp"
 
 namespace relit::bake {
 namespace {
@@ -36,7 +36,8 @@ class Mask {
     const int y1 =
         std::min(size_.y - 1, static_cast<int>(std::floor(std::max(a.y, b.y) + reach - 0.5)));
     for (int y = y0; y <= y1; ++y) {
-      const SlabExtent e = slab_extent({a, b, b}, y + 0.5 - reach, y + 0.5 + reach);
+      const decoders::SlabExtent e =
+          decoders::slab_extent({a, b, b}, y + 0.5 - reach, y + 0.5 + reach);
       mark(y, e.lo - reach, e.hi + reach);
     }
   }

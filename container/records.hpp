@@ -202,7 +202,7 @@ struct ModelRecord {
   std::uint16_t width = 128;  ///< of the light map, texels
   std::uint16_t height = 128;
   std::vector<Rgb> mean;               ///< μ[n], one per coefficient
-  std::int32_t prediction_plane = -1;  ///< reserved: index of s among the planes; -1: no prediction
+  std::int32_t prediction_plane = -1;  ///< index of s among the planes; -1: no prediction
   bool operator==(const ModelRecord&) const = default;
 };
 

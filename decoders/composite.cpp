@@ -108,11 +108,23 @@ Status check_light(const CompositeJob& job) {
       !std::all_of(light.irradiance.begin(), light.irradiance.end(), finite)) {
     return fail(ErrorCode::kInvalid, "the folded light is not finite");
   }
-  if (light.prediction_plane < -1 ||
-      light.prediction_plane >= static_cast<int>(job.planes.size())) {
-    return fail(ErrorCode::kInvalid, "prediction plane " + std::to_string(light.prediction_plane) +
-                                         " is not one of " + std::to_string(job.planes.size()));
+  return {};
+}
+
+Status check_prediction(const CompositePrediction& prediction, std::size_t planes,
+                        std::size_t texels) {
+  if (prediction.plane < -1 || prediction.plane >= static_cast<int>(planes)) {
+    return fail(ErrorCode::kInvalid, "prediction plane " + std::to_string(prediction.plane) +
+                                         " is not one of " + std::to_string(planes));
   }
+  if (prediction.plane < 0) return {};
+  if (prediction.normals.size() != texels) {
+    return fail(ErrorCode::kInvalid, "a prediction needs " + std::to_string(texels) +
+                                         " normals, not " +
+                                         std::to_string(prediction.normals.size()));
+  }
+  if (!(prediction.share >= 0) || prediction.share > 1)
+    return fail(ErrorCode::kInvalid, "the share of a prediction is outside 0 to 1");
   return {};
 }
 
@@ -144,12 +156,13 @@ Status CompositeJob::validate() const {
                                          std::to_string(3 * texels));
   }
   RELIT_TRY(check_light(*this));
-  if (light.prediction_plane >= 0 && normals.size() != texels) {
-    return fail(ErrorCode::kInvalid, "a prediction needs " + std::to_string(texels) +
-                                         " normals, not " + std::to_string(normals.size()));
-  }
+  for (const CompositePrediction& prediction : predictions)
+    RELIT_TRY(check_prediction(prediction, planes.size(), texels));
   for (std::size_t k = 0; k < planes.size(); ++k) {
-    if (is_zero(light.weights[k]) && static_cast<int>(k) != light.prediction_plane) continue;
+    const bool predicts = std::any_of(predictions.begin(), predictions.end(), [&](const auto& p) {
+      return p.plane == static_cast<int>(k);
+    });
+    if (is_zero(light.weights[k]) && !(predicts && !planes[k].mantissa.empty())) continue;
     RELIT_TRY(check_plane(planes[k], *this, k));
     for (float weight : light.weights[k]) {
       if (!std::isfinite(weight * planes[k].scale)) {

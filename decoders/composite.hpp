@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <array>
 #include <glm/glm.hpp>
 #include <span>
 #include <vector>
@@ -29,6 +30,13 @@ Status fold_light(const container::ModelRecord& model,
                   std::span<const container::LayerRecord> layers, const Light& light,
                   FoldedWeights& out);
 
+/// s·E(N) of one frame, with its share of a blend; 0 ≤ share ≤ 1.
+struct CompositePrediction {
+  int plane = -1;                      ///< s among the job's planes; -1: none
+  std::span<const glm::vec3> normals;  ///< of each texel of the job's `out`; finite
+  float share = 1;
+};
+
 /// The composite, on the CPU: light map = s·E(N) + constant + Σ_k w[k]·value_k for every texel. A
 /// blend of frames is the same sum over the planes of both, each with its share of the weight.
 ///
@@ -49,8 +57,8 @@ struct CompositeJob {
   /// 1: every texel. 2: every second one of every second row, from (0, 0) on: a light map of half
   /// the size, rounded up, whose texels are bit for bit those of the full one.
   int every = 1;
-  std::span<const glm::vec3>
-      normals;           ///< of each texel of `out`, only with a prediction plane; finite
+  /// One, or for a blend of frames two. (Of `light`, prediction_plane is not looked at.)
+  std::array<CompositePrediction, 2> predictions{};
   std::span<float> out;  ///< [3][out_height()][out_width()], linear, divided by light.magnitude,
                          ///< may be negative
 

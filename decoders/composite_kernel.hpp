@@ -330,15 +330,15 @@ RELIT_KERNEL inline bool same_steps(const PlaneView& a, const PlaneView& b) {
          a.exponent_shift == b.exponent_shift && a.exponent_zero == b.exponent_zero;
 }
 
-/// The factors of E(N)'s polynomial, with the plane's scale.
-RELIT_KERNEL inline void fold_prediction(const FoldedLight& light, float scale,
+/// The factors of E(N)'s polynomial, with `scale`: the plane's times its share.
+RELIT_KERNEL inline void fold_prediction(const FoldedLight& light, double scale,
                                          float (&factors)[9][3]) {
   constexpr double kFactor[9] = {kBand0,   kBand1,   kBand1,   kBand1,      kBand2Xy,
                                  kBand2Xy, kBand2Zz, kBand2Xy, kBand2Xy / 2};
   for (std::size_t n = 0; n < 9; ++n) {
     for (std::size_t c = 0; c < 3; ++c) {
-      factors[n][c] = static_cast<float>(kFactor[n] * static_cast<double>(light.irradiance[n][c]) *
-                                         static_cast<double>(scale));
+      factors[n][c] =
+          static_cast<float>(kFactor[n] * static_cast<double>(light.irradiance[n][c]) * scale);
     }
   }
 }
@@ -452,10 +452,12 @@ RELIT_KERNEL void run_tile(const CompositeJob& job, const Tile& tile) {
   fill<V>(job, tile);
   for (std::size_t k = 0; k < job.planes.size(); ++k) {
     const PlaneView& plane = job.planes[k];
-    const bool predicts = static_cast<int>(k) == job.light.prediction_plane;
+    const CompositePrediction* predicts = nullptr;
+    for (const CompositePrediction& prediction : job.predictions)
+      if (prediction.plane == static_cast<int>(k)) predicts = &prediction;
     PlaneJob add;
     const int channels = aim(job, k, tile, add);
-    if (plane.mantissa.empty() || (channels == 0 && !predicts)) continue;
+    if (plane.mantissa.empty() || (channels == 0 && predicts == nullptr)) continue;
     if (!plane.exponent.empty()) {
       if (stepped == nullptr || !same_steps(*stepped, plane)) {
         if (used_steps == kMostPlanes) {
@@ -468,13 +470,16 @@ RELIT_KERNEL void run_tile(const CompositeJob& job, const Tile& tile) {
       add.steps = steps[used_steps - 1];
     }
     if (channels > 0) queues.add(add, channels);
-    if (predicts) {
+    if (predicts != nullptr) {
       float factors[9][3];
-      fold_prediction(job.light, plane.scale, factors);
+      fold_prediction(job.light,
+                      static_cast<double>(plane.scale) * static_cast<double>(predicts->share),
+                      factors);
       add.prediction = factors;
-      add.normals = &job.normals[static_cast<std::size_t>(tile.y) *
-                                     static_cast<std::size_t>(job.out_width()) +
-                                 static_cast<std::size_t>(tile.x)]
+      add.normals = &predicts
+                         ->normals[static_cast<std::size_t>(tile.y) *
+                                       static_cast<std::size_t>(job.out_width()) +
+                                   static_cast<std::size_t>(tile.x)]
                          .x;
       queues.flush_all();
       run_planes<V>(&add, 1, Operation::kPredict, tile);

@@ -43,7 +43,7 @@ Status mark_covered_texels(std::span<const Mesh> meshes, int width, int height,
                         " lie over one another many times; the charts of a light map are disjoint");
       }
       left -= rows;
-      triangle.for_each_row(width, height, [&](int y, int x0, int x1) {
+      triangle.for_each_row(0, height, width, [&](int y, int x0, int x1) {
         const auto row =
             mask.subspan(static_cast<std::size_t>(y) * static_cast<std::size_t>(width));
         std::fill(row.begin() + x0, row.begin() + x1 + 1, std::uint8_t{1});

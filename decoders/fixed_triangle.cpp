@@ -48,12 +48,12 @@ std::array<glm::dvec2, 3> FixedTriangle::texels() const {
   return out;
 }
 
-bool FixedTriangle::rows(int height, int& y0, int& y1) const {
+bool FixedTriangle::rows(int first, int end, int& y0, int& y1) const {
   if (degenerate()) return false;
   const std::int64_t lo = std::min({p_[0].y, p_[1].y, p_[2].y});
   const std::int64_t hi = std::max({p_[0].y, p_[1].y, p_[2].y});
-  y0 = static_cast<int>(std::max<std::int64_t>(0, -floor_div(kHalf - lo, kOne)));
-  y1 = static_cast<int>(std::min<std::int64_t>(height - 1, floor_div(hi - kHalf, kOne)));
+  y0 = static_cast<int>(std::max<std::int64_t>(first, -floor_div(kHalf - lo, kOne)));
+  y1 = static_cast<int>(std::min<std::int64_t>(end - 1, floor_div(hi - kHalf, kOne)));
   return y0 <= y1;
 }
 

@@ -22,11 +22,12 @@ class FixedTriangle {
 
   [[nodiscard]] bool degenerate() const { return area2_ == 0; }
 
-  /// Calls `visit(y, x0, x1)` for every row in which it owns the texels x0..x1.
+  /// Calls `visit(y, x0, x1)` for every row from `first` to before `end` in which it owns the
+  /// texels x0..x1.
   template <class Visit>
-  void for_each_row(int width, int height, Visit&& visit) const {
+  void for_each_row(int first, int end, int width, Visit&& visit) const {
     int y0, y1;
-    if (!rows(height, y0, y1)) return;
+    if (!rows(first, end, y0, y1)) return;
     for (int y = y0; y <= y1; ++y) {
       int x0, x1;
       if (row(y, width, x0, x1)) visit(y, x0, x1);
@@ -40,7 +41,7 @@ class FixedTriangle {
   [[nodiscard]] std::array<glm::dvec2, 3> texels() const;
 
  private:
-  bool rows(int height, int& y0, int& y1) const;
+  bool rows(int first, int end, int& y0, int& y1) const;
   bool row(int y, int width, int& x0, int& x1) const;
 
   std::array<glm::i64vec2, 3> p_{};

@@ -5,6 +5,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <numbers>
 #include <string>
 
 #include "container/base/limits.hpp"
@@ -315,8 +316,27 @@ double plane_value(const PlaneView& plane, int x, int y) {
                     exponent - plane.exponent_zero);
 }
 
+namespace {
+
+/// Adds s·A_l/π·Y_n(N) to [coefficients][3][texels].
+void add_prediction(std::span<const double> scales, std::span<const glm::vec3> normals, int order,
+                    std::span<double> sum) {
+  std::array<double, limits::kCoefficients> y{};
+  const auto coefficients = static_cast<std::size_t>(coefficient_count(order));
+  for (std::size_t p = 0; p < scales.size(); ++p) {
+    evaluate_sh(order, glm::dvec3(normals[p]), std::span(y).first(coefficients));
+    for (std::size_t i = 0; i < coefficients * 3; ++i) {
+      const double cosine = clamped_cosine(band_of(static_cast<int>(i / 3))) / std::numbers::pi;
+      sum[i * scales.size() + p] += scales[p] * cosine * y[i / 3];
+    }
+  }
+}
+
+}  // namespace
+
 Status reconstruct(std::span<const PlaneView> planes, const ModelRecord& model,
-                   std::span<const LayerRecord> layers, std::span<float> out) {
+                   std::span<const LayerRecord> layers, std::span<float> out,
+                   std::span<const glm::vec3> normals) {
   const auto coefficients = static_cast<std::size_t>(coefficient_count(model.order));
   const std::size_t texels = std::size_t{model.width} * model.height;
   if (model.order > limits::kShOrder || out.size() != coefficients * 3 * texels ||
@@ -324,6 +344,10 @@ Status reconstruct(std::span<const PlaneView> planes, const ModelRecord& model,
     return fail(ErrorCode::kInvalid, "the transfer's array or the model's mean is not of " +
                                          std::to_string(coefficients) + " coefficients of " +
                                          size_text(model.width, model.height) + " texels");
+  }
+  if (model.prediction_plane >= 0 && normals.size() != texels) {
+    return fail(ErrorCode::kInvalid, "the model's prediction needs " + std::to_string(texels) +
+                                         " normals, not " + std::to_string(normals.size()));
   }
   std::vector<double> sum(out.size());
   for (std::size_t i = 0; i < coefficients * 3 && !model.mean.empty(); ++i) {
@@ -337,12 +361,14 @@ Status reconstruct(std::span<const PlaneView> planes, const ModelRecord& model,
       if (k >= planes.size()) {
         return fail(ErrorCode::kInvalid, "the layers have more planes than the frame");
       }
+      const bool predicts = static_cast<std::int64_t>(k) == model.prediction_plane;
       const PlaneView& plane = planes[k++];
       if (plane.mantissa.empty()) continue;
       for (std::size_t p = 0; p < texels; ++p) {
         values[p] = plane_value(plane, static_cast<int>(p % model.width),
                                 static_cast<int>(p / model.width));
       }
+      if (predicts) add_prediction(values, normals, model.order, sum);
       for (const container::MatrixEntry& entry : record.matrix) {
         if (entry.coefficient >= coefficients || entry.channel > 2) {
           return fail(ErrorCode::kInvalid, "a matrix entry is out of range");

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <glm/glm.hpp>
 #include <map>
 #include <memory>
 #include <optional>
@@ -215,10 +216,12 @@ class PlaneDecoder {
 /// value_k at texel (x, y), by the formula of PlaneView in double precision.
 [[nodiscard]] double plane_value(const PlaneView& plane, int x, int y);
 
-/// T[n,c] = μ[n,c] + Σ_k M[n,c,k]·value_k, summed in double precision. Empty planes count as zero.
-/// `out` is float [coefficients][3][H][W]. Errors: kInvalid when sizes do not fit. Prediction
-/// planes are not applied (the model's normals are needed for that).
+/// T[n,c] = s·A_l/π·Y_n(N) + μ[n,c] + Σ_k M[n,c,k]·value_k, summed in double precision. Empty
+/// planes count as zero. `out` is float [coefficients][3][H][W]; `normals`, [H][W], are
+/// TexelNormals' of the frame, and needed where the model has a prediction plane. Errors: kInvalid
+/// when sizes do not fit.
 Status reconstruct(std::span<const PlaneView> planes, const container::ModelRecord& model,
-                   std::span<const container::LayerRecord> layers, std::span<float> out);
+                   std::span<const container::LayerRecord> layers, std::span<float> out,
+                   std::span<const glm::vec3> normals = {});
 
 }  // namespace relit::decoders

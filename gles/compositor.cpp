@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "gles/prediction.hpp"
 #include "gles/shaders.hpp"
 
 namespace relit::gles {
@@ -161,10 +162,11 @@ void Compositor::sample_planes(std::span<const PlaneView> planes, int slot) {
   const int width = description_.width, height = description_.height;
   for (std::size_t k = 0; k < planes.size(); ++k) {
     float* out = samples_.data() + (static_cast<std::size_t>(slot) * planes.size() + k) * kSamples;
-    if (planes[k].mantissa.empty() || !holds(k, slot)) {
+    if (!holds(k, slot)) {
       std::fill(out, out + kSamples, 0.0f);
       continue;
     }
+    if (planes[k].mantissa.empty()) continue;  // kept, with its samples
     for (int j = 0; j < kSampleSide; ++j)
       for (int i = 0; i < kSampleSide; ++i)
         *out++ = static_cast<float>(value_at(planes[k], (2 * i + 1) * width / (2 * kSampleSide),
@@ -174,23 +176,38 @@ void Compositor::sample_planes(std::span<const PlaneView> planes, int slot) {
 
 double Compositor::sampled_peak(const FoldedLight& light, const FrameSlots& frames) const {
   double peak = 0;
-  const std::size_t planes = light.weights.size();
   for (std::size_t i = 0; i < kSamples; ++i) {
     double sum[3] = {};
     for (std::size_t c = 0; c < 3; ++c) sum[c] = static_cast<double>(light.constant[c]);
     for (int role = 0; role < FrameSlots::kRoles; ++role) {
       const auto share = static_cast<double>(frames.weight(role));
       if (share == 0) continue;
-      const float* samples =
-          samples_.data() + static_cast<std::size_t>(frames.slot(role)) * planes * kSamples + i;
-      for (std::size_t k = 0; k < planes; ++k)
-        for (std::size_t c = 0; c < 3; ++c)
-          sum[c] += share * static_cast<double>(light.weights[k][c]) *
-                    static_cast<double>(samples[k * kSamples]);
+      const std::array<double, 3> frame = sampled_sum(light, frames.slot(role), i);
+      for (std::size_t c = 0; c < 3; ++c) sum[c] += share * frame[c];
     }
     peak = std::max({peak, sum[0], sum[1], sum[2]});
   }
   return peak > 1e-30 ? kPeakMargin * peak : 1.0;
+}
+
+// Without the constant.
+std::array<double, 3> Compositor::sampled_sum(const FoldedLight& light, int slot,
+                                              std::size_t sample) const {
+  const std::size_t planes = light.weights.size();
+  const float* samples =
+      samples_.data() + static_cast<std::size_t>(slot) * planes * kSamples + sample;
+  const auto value = [&](std::size_t k) { return static_cast<double>(samples[k * kSamples]); };
+  std::array<double, 3> sum{};
+  for (std::size_t k = 0; k < planes; ++k)
+    for (std::size_t c = 0; c < 3; ++c)
+      sum[c] += static_cast<double>(light.weights[k][c]) * value(k);
+  if (!sheets_.can_predict(slot)) return sum;
+  const auto normal = static_cast<std::size_t>(description_.normal_planes);
+  const std::array<double, 3> irradiance =
+      predicted_irradiance(light, {value(normal), value(normal + 1), value(normal + 2)});
+  const double s = value(static_cast<std::size_t>(description_.prediction_plane));
+  for (std::size_t c = 0; c < 3; ++c) sum[c] += s * irradiance[c];
+  return sum;
 }
 
 Result<LightMap> Compositor::composite(const FoldedLight& light) {

@@ -15,10 +15,17 @@
 
 namespace relit::gles {
 
-/// The composite on the GPU: light map = constant + Σ_k w[k] · value_k. Planes stay as they were
-/// decoded: bytes go up, and mantissa and exponent are joined in the fragment shader (Xu et al.,
-/// section 3.3; here with signed mantissas and any matrix). composite() adds in texture space, one
-/// fragment a texel; fuse() leaves the sum to the shader that draws the meshes.
+/// The composite on the GPU: light map = constant + Σ_k w[k] · value_k + s · E(N). Planes stay as
+/// they were decoded: bytes go up, and mantissa and exponent are joined in the fragment shader (Xu
+/// et al., section 3.3; here with signed mantissas and any matrix). composite() adds in texture
+/// space, one fragment a texel; fuse() leaves the sum to the shader that draws the meshes.
+///
+/// s · E(N) is for models with a prediction: s is one of their planes, E(N) = Σ_{n<9}
+/// FoldedLight::irradiance[n] · Y_n(N), and N is what three more planes hold, which the host makes
+/// for each posed frame and uploads with its planes (see PlaneSetDescription::normal_planes).
+/// Without any of these four in the slot, s · E(N) counts as zero. It takes four lookups, five with
+/// exponents, and nine uniforms a frame. The 16 bits of N move E(N) by at most 5e-5 · Σ_n
+/// |irradiance[n]|: ½/32767 a coordinate, and Y_6, the steepest, climbs by 1.9.
 ///
 /// In texture space everything fits one pass where uniforms and texture units allow it (200 planes
 /// and more on ES 3, some 100 on most of ES 2). More planes, and all but the smallest sets with
@@ -41,10 +48,10 @@ class Compositor {
                                                     const PlaneSetDescription& description);
 
   /// Uploads a frame's planes to a slot, as many as were described and as described (bit depth,
-  /// shifts, sizes at least the light map's). Those with an empty mantissa view, or with 0 in
-  /// `wanted` (empty: all are wanted), are left out and count as zero; with `keep`, planes that the
-  /// slot has of the same frame stay and are not uploaded again. What the views point to can go
-  /// when it returns. Errors: kInvalid; kEnvironment from GL.
+  /// shifts, sizes at least the light map's, the scale of normals). Those with an empty mantissa
+  /// view, or with 0 in `wanted` (empty: all are wanted), are left out and count as zero; with
+  /// `keep`, planes that the slot has of the same frame stay and are not uploaded again. What the
+  /// views point to can go when it returns. Errors: kInvalid; kEnvironment from GL.
   Status upload(std::span<const PlaneView> planes, int slot,
                 std::span<const std::uint8_t> wanted = {}, bool keep = false);
   /// The same to the slot that was not used last.
@@ -55,11 +62,8 @@ class Compositor {
   }
 
   /// Composites frames that were uploaded. `half_size`: every second texel of every second row, see
-  /// LightMap::place. Errors: kInvalid (nothing uploaded, count of weights, a number that is not
-  /// finite), kUnsupported for a light with a prediction plane, whose models the CPU composites.
-  /// (s · E(N) would be one more additive pass at the end of this function: the posed meshes drawn
-  /// in light-map coordinates, with their normals as an attribute, s's sheet as a texture and
-  /// FoldedLight::irradiance as sixteen uniforms.)
+  /// LightMap::place. Errors: kInvalid (nothing uploaded, count of weights, another prediction
+  /// plane than the described one, a weight of a normal, a number that is not finite).
   Result<LightMap> composite(const FoldedLight& light, const FrameSlots& frames,
                              bool half_size = false);
   /// The frame uploaded last.
@@ -117,6 +121,8 @@ class Compositor {
   Status make_target(Target& target, int width, int height) const;
   void sample_planes(std::span<const PlaneView> planes, int slot);
   [[nodiscard]] double sampled_peak(const FoldedLight& light, const FrameSlots& frames) const;
+  [[nodiscard]] std::array<double, 3> sampled_sum(const FoldedLight& light, int slot,
+                                                  std::size_t sample) const;
   struct Drawing {
     const FoldedLight& light;
     const FrameSlots& frames;

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "gles/prediction.hpp"
+
 namespace relit::gles {
 namespace {
 
@@ -15,6 +17,54 @@ bool is_finite(const Rgb& rgb) {
 
 bool is_zero(const Rgb& rgb) { return rgb[0] == 0 && rgb[1] == 0 && rgb[2] == 0; }
 
+Status check_folded_light(const FoldedLight& light, const PlaneSheets& sheets) {
+  if (light.prediction_plane != sheets.prediction_plane())
+    return fail(ErrorCode::kInvalid, "the folded light predicts by plane " +
+                                         std::to_string(light.prediction_plane) +
+                                         ", described was plane " +
+                                         std::to_string(sheets.prediction_plane()) + " (-1: none)");
+  if (!is_finite(light.constant) || !(light.magnitude > 0) || !std::isfinite(light.magnitude) ||
+      !std::all_of(light.irradiance.begin(), light.irradiance.end(),
+                   [](const Rgb& row) { return is_finite(row); }))
+    return fail(ErrorCode::kInvalid, "the folded light is not finite");
+  if (light.weights.size() != sheets.plane_count())
+    return fail(ErrorCode::kInvalid,
+                std::to_string(light.weights.size()) + " weights in the folded light; " +
+                    std::to_string(sheets.plane_count()) + " planes were described");
+  for (std::size_t k = 0; k < light.weights.size(); ++k) {
+    if (!is_finite(light.weights[k]))
+      return fail(ErrorCode::kInvalid,
+                  "the weight of plane " + std::to_string(k) + " is not finite");
+    if (sheets.is_normal(k) && !is_zero(light.weights[k]))
+      return fail(ErrorCode::kInvalid,
+                  "plane " + std::to_string(k) + " is of the normals and has a weight");
+    for (std::size_t c = 0; c < 3; ++c)
+      if (light.weights[k][c] != 0 && (sheets.channels(k) >> c & 1u) == 0)
+        return fail(
+            ErrorCode::kInvalid,
+            "plane " + std::to_string(k) + " has a weight for a channel it was described without");
+  }
+  return {};
+}
+
+// At most so much is any channel's Σ |terms|.
+double sum_bound(const FoldedLight& light, const FrameSlots& frames, const PlaneSheets& sheets) {
+  double bound[3];
+  for (std::size_t c = 0; c < 3; ++c) bound[c] = std::abs(static_cast<double>(light.constant[c]));
+  const std::array<double, 3> irradiance = irradiance_bound(light);
+  for (int role = 0; role < FrameSlots::kRoles; ++role) {
+    for (std::size_t k = 0; k < light.weights.size(); ++k) {
+      const double most = std::abs(static_cast<double>(frames.weight(role)) *
+                                   sheets.state(k, frames.slot(role)).factor);
+      const bool predicts = static_cast<int>(k) == light.prediction_plane;
+      for (std::size_t c = 0; c < 3; ++c)
+        bound[c] += most * (std::abs(static_cast<double>(light.weights[k][c])) +
+                            (predicts ? irradiance[c] : 0));
+    }
+  }
+  return std::max({bound[0], bound[1], bound[2]});
+}
+
 }  // namespace
 
 bool PlanePass::Batch::same_kind(const Batch& other) const {
@@ -22,7 +72,12 @@ bool PlanePass::Batch::same_kind(const Batch& other) const {
          sheets == other.sheets && exponent_sheet == other.exponent_sheet && wide == other.wide;
 }
 
-// Neighbours that share their exponents become groups of three, the others stand alone.
+int PlanePass::Batch::vectors() const {
+  return predicts ? static_cast<int>(kHarmonics) : planes_per_group;
+}
+
+// Neighbours that share their exponents become groups of three, the others stand alone. s is not
+// among them: a weight of its own is part of E(N)'s constant harmonic.
 std::vector<PlanePass::Batch> PlanePass::group_planes(const PlaneSetDescription& d,
                                                       const PlaneSheets& sheets) {
   std::vector<Batch> batches;
@@ -43,18 +98,27 @@ std::vector<PlanePass::Batch> PlanePass::group_planes(const PlaneSetDescription&
     if (at == batches.end()) at = batches.insert(batches.end(), kind);
     at->groups.push_back(group);
   };
+  const auto predicts = [&](std::size_t plane) {
+    return static_cast<int>(plane) == d.prediction_plane || sheets.is_normal(plane);
+  };
   for (std::size_t k = 0; k < d.planes.size();) {
+    if (predicts(k)) {
+      ++k;
+      continue;
+    }
     int count = 1;
     const int tile = sheets.exponent(k).tile;
     while (tile >= 0 && count < 3 && k + static_cast<std::size_t>(count) < d.planes.size()) {
       const std::size_t next = k + static_cast<std::size_t>(count);
-      if (sheets.exponent(next).tile != tile || d.planes[next].bit_depth != d.planes[k].bit_depth)
+      if (sheets.exponent(next).tile != tile || predicts(next) ||
+          d.planes[next].bit_depth != d.planes[k].bit_depth)
         break;
       ++count;
     }
     add(k, count);
     k += static_cast<std::size_t>(count);
   }
+  if (d.prediction_plane >= 0) batches.push_back(prediction(d, sheets));
   if (sheets.slot_count() < FrameSlots::kRoles) return batches;
   const std::size_t count = batches.size();
   for (std::size_t b = 0; b < count; ++b) {
@@ -68,30 +132,53 @@ std::vector<PlanePass::Batch> PlanePass::group_planes(const PlaneSetDescription&
   return batches;
 }
 
+PlanePass::Batch PlanePass::prediction(const PlaneSetDescription& d, const PlaneSheets& sheets) {
+  Batch batch;
+  batch.predicts = true;
+  batch.planes_per_group = 4;
+  const auto s = static_cast<std::size_t>(d.prediction_plane);
+  batch.wide = d.planes[s].bit_depth > 8;
+  batch.exponent_sheet = sheets.exponent(s).sheet;
+  Group group;
+  group.planes = {d.prediction_plane, d.normal_planes, d.normal_planes + 1, d.normal_planes + 2};
+  for (int i = 0; i < batch.planes_per_group; ++i)
+    batch.sheets[static_cast<std::size_t>(i)] = sheets.mantissa(plane_of(group, i)).sheet;
+  batch.groups.push_back(group);
+  return batch;
+}
+
 std::vector<int> PlanePass::sheets_with(const Batch& batch) const {
   std::vector<int> needed = sheets_;
-  for (const int sheet : {batch.sheets[0], batch.sheets[1], batch.sheets[2], batch.exponent_sheet})
+  const auto add = [&](int sheet) {
     if (sheet >= 0 && std::find(needed.begin(), needed.end(), sheet) == needed.end())
       needed.push_back(sheet);
+  };
+  for (const int sheet : batch.sheets) add(sheet);
+  add(batch.exponent_sheet);
   return needed;
 }
 
 std::vector<PlanePass> PlanePass::plan(const PlaneSetDescription& description,
                                        const PlaneSheets& sheets, const Limits& limits) {
   std::vector<PlanePass> passes(1);
-  int vectors_left = limits.vectors;
+  int vectors_left = limits.vectors, lookups_left = limits.lookups;
   for (const Batch& batch : group_planes(description, sheets)) {
     std::size_t taken = 0;
     while (taken < batch.groups.size()) {
       std::vector<int> needed = passes.back().sheets_with(batch);
       const bool empty = passes.back().batches_.empty();
-      int room = limits.lookups > 0 ? limits.lookups / batch.lookups()
-                                    : vectors_left / batch.planes_per_group;
-      if (limits.lookups > 0 && !empty) room = 0;
+      int room = vectors_left / batch.vectors();
+      if (limits.lookups > 0) {
+        room = std::min(room, lookups_left / batch.lookups());
+        // All its lookups are made whenever it is drawn: for one frame, the other's would be in
+        // vain.
+        if (!empty && passes.back().batches_.front().role != batch.role) room = 0;
+      }
       if (static_cast<int>(needed.size()) > limits.units) room = 0;
       if (room < 1 && !empty) {
         passes.emplace_back();
         vectors_left = limits.vectors;
+        lookups_left = limits.lookups;
         continue;
       }
       Batch part = batch;
@@ -100,7 +187,8 @@ std::vector<PlanePass> PlanePass::plan(const PlaneSetDescription& description,
       const auto begin = batch.groups.begin() + static_cast<std::ptrdiff_t>(taken);
       part.groups.assign(begin, begin + static_cast<std::ptrdiff_t>(count));
       taken += count;
-      vectors_left -= part.count() * part.planes_per_group;
+      vectors_left -= part.count() * part.vectors();
+      lookups_left -= part.count() * part.lookups();
       passes.back().sheets_ = std::move(needed);
       passes.back().batches_.push_back(std::move(part));
     }
@@ -111,7 +199,7 @@ std::vector<PlanePass> PlanePass::plan(const PlaneSetDescription& description,
 
 bool PlanePass::within(const Limits& limits) const {
   int vectors = 0;
-  for (const Batch& batch : batches_) vectors += batch.count() * batch.planes_per_group;
+  for (const Batch& batch : batches_) vectors += batch.count() * batch.vectors();
   return vectors <= limits.vectors && unit_count() <= limits.units;
 }
 
@@ -134,36 +222,11 @@ std::size_t PlanePass::plane_of(const Group& group, int slot) {
 
 Result<double> PlanePass::normalise(const FoldedLight& light, const FrameSlots& frames,
                                     const PlaneSheets& sheets) {
-  if (light.prediction_plane >= 0)
-    return fail(ErrorCode::kUnsupported,
-                "models with a prediction plane are composited on the CPU (--composite cpu)");
-  if (!is_finite(light.constant) || !(light.magnitude > 0) || !std::isfinite(light.magnitude))
-    return fail(ErrorCode::kInvalid, "the folded light is not finite");
-  if (light.weights.size() != sheets.plane_count())
-    return fail(ErrorCode::kInvalid,
-                std::to_string(light.weights.size()) + " weights in the folded light; " +
-                    std::to_string(sheets.plane_count()) + " planes were described");
+  RELIT_TRY(check_folded_light(light, sheets));
   if (frames.from < 0 || std::max(frames.from, frames.to) >= sheets.slot_count() ||
       !(frames.blend >= 0) || frames.blend > 1)
     return fail(ErrorCode::kInvalid, "frames that are not there, or a blend outside 0 to 1");
-  double bound[3] = {};
-  for (std::size_t c = 0; c < 3; ++c) bound[c] = std::abs(static_cast<double>(light.constant[c]));
-  for (std::size_t k = 0; k < light.weights.size(); ++k) {
-    if (!is_finite(light.weights[k]))
-      return fail(ErrorCode::kInvalid,
-                  "the weight of plane " + std::to_string(k) + " is not finite");
-    for (std::size_t c = 0; c < 3; ++c)
-      if (light.weights[k][c] != 0 && (sheets.channels(k) >> c & 1u) == 0)
-        return fail(
-            ErrorCode::kInvalid,
-            "plane " + std::to_string(k) + " has a weight for a channel it was described without");
-    for (int role = 0; role < FrameSlots::kRoles; ++role)
-      for (std::size_t c = 0; c < 3; ++c)
-        bound[c] += std::abs(static_cast<double>(frames.weight(role)) *
-                             static_cast<double>(light.weights[k][c]) *
-                             sheets.state(k, frames.slot(role)).factor);
-  }
-  const double largest = std::max({bound[0], bound[1], bound[2]});
+  const double largest = sum_bound(light, frames, sheets);
   if (!(largest < 1e30))
     return fail(ErrorCode::kInvalid, "the planes' scales and exponents exceed the range of floats");
   int exponent = 0;
@@ -174,8 +237,7 @@ Result<double> PlanePass::normalise(const FoldedLight& light, const FrameSlots& 
 PlanePass::Weights PlanePass::make_weights() const {
   Weights weights;
   for (const Batch& batch : batches_) {
-    weights.data.emplace_back(4 * batch.groups.size() *
-                              static_cast<std::size_t>(batch.planes_per_group));
+    weights.data.emplace_back(4 * batch.groups.size() * static_cast<std::size_t>(batch.vectors()));
     weights.counts.push_back(0);
   }
   return weights;
@@ -189,7 +251,8 @@ void PlanePass::fill(const FoldedLight& light, const FrameSlots& frames, const P
   for (std::size_t b = 0; b < batches_.size(); ++b) {
     const Batch& batch = batches_[b];
     const double share = static_cast<double>(frames.weight(batch.role)) / normalisation;
-    const int needed = fill_batch(b, light, frames, sheets, share, out);
+    const int needed = batch.predicts ? fill_prediction(b, light, frames, sheets, share, out)
+                                      : fill_batch(b, light, frames, sheets, share, out);
     const int step = (batch.count() + kShades - 1) / kShades;
     out.counts[b] =
         lookups_ ? batch.count() : std::min(batch.count(), (needed + step - 1) / step * step);
@@ -235,6 +298,33 @@ int PlanePass::fill_batch(std::size_t index, const FoldedLight& light, const Fra
   return needed;
 }
 
+// The bias of s is not in the constant: what s is multiplied by is another at every texel.
+int PlanePass::fill_prediction(std::size_t index, const FoldedLight& light,
+                               const FrameSlots& frames, const PlaneSheets& sheets, double share,
+                               Weights& weights) const {
+  const int slot = frames.slot(batches_[index].role);
+  const auto s = static_cast<std::size_t>(light.prediction_plane);
+  const PlaneSheets::PlaneState& state = sheets.state(s, slot);
+  std::vector<float>& out = weights.data[index];
+  std::fill(out.begin(), out.end(), 0.0f);
+  out[3] = 255;
+  if (!state.present || share == 0) return 0;
+  const bool predicts = sheets.can_predict(slot);
+  bool any = false;
+  for (std::size_t n = 0; n < kHarmonics; ++n) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      double factor =
+          predicts ? kHarmonicFactors[n] * static_cast<double>(light.irradiance[n][c]) : 0;
+      if (n == 0) factor += static_cast<double>(light.weights[s][c]);
+      out[4 * n + c] = static_cast<float>(factor * state.factor * share);
+      any = any || factor != 0;
+    }
+  }
+  if (!any) return 0;
+  out[3] = static_cast<float>(state.exponent_reference);
+  return 1;
+}
+
 PlanePass::Locations PlanePass::locate(const Functions& gl, const Program& program,
                                        int (*unit_of)(int)) const {
   Locations at;
@@ -250,8 +340,7 @@ void PlanePass::set_weights(const Functions& gl, const Locations& at,
                             const Weights& weights) const {
   for (std::size_t b = 0; b < batches_.size(); ++b)
     if (weights.counts[b] > 0)
-      gl.Uniform4fv(at[b], weights.counts[b] * batches_[b].planes_per_group,
-                    weights.data[b].data());
+      gl.Uniform4fv(at[b], weights.counts[b] * batches_[b].vectors(), weights.data[b].data());
 }
 
 void PlanePass::bind(const Functions& gl, const FrameSlots& frames, const PlaneSheets& sheets,

@@ -32,15 +32,16 @@ struct FrameSlots {
 /// around a place, filtered bilinearly.
 enum class PlaneTaps { kOne, kFour };
 
-/// A part of Σ_k w[k] · value_k that one shader can add up: which planes, the text of the shader
-/// that does it, and its uniforms. Both composites on the GPU are made of these: in texture space,
-/// where further passes add to the target, and fused, where one must do.
+/// A part of s · E(N) + Σ_k w[k] · value_k that one shader can add up: which planes, the text of
+/// the shader that does it, and its uniforms. Both composites on the GPU are made of these: in
+/// texture space, where further passes add to the target, and fused, where one must do.
 ///
 /// Planes of both roles of FrameSlots are in it, so that a blend is the same sum with more terms. A
 /// shader is straight lines with the planes' places as literals, which runs several times faster
 /// than a loop where compilers cannot unroll it, and leaves the uniforms to the weights. So there
 /// is one for each of a few numbers of planes: counts, of groups of planes by batch, from the
-/// front.
+/// front. A prediction is a batch of one group: s and the normal's three planes, by nine uniforms;
+/// its light or its planes missing, it is none.
 class PlanePass {
  public:
   struct Limits {
@@ -71,14 +72,14 @@ class PlanePass {
   /// stay within 2^6: far from half floats' overflow at 2^16, and products of a thousandth of a
   /// thousandth of that are still above their subnormals. Errors: kInvalid for a count of weights
   /// that is not the planes', a weight for a channel that the plane was not described to have, or
-  /// numbers that are not finite or leave the range of floats;
-  /// kUnsupported for a light with a prediction plane.
+  /// numbers that are not finite or leave the range of floats; for a prediction plane that is not
+  /// the described one, or a weight of a normal.
   static Result<double> normalise(const FoldedLight& light, const FrameSlots& frames,
                                   const PlaneSheets& sheets);
 
   /// The weights of all planes, as a shader takes them, and how many groups a shader must have.
   struct Weights {
-    std::vector<std::vector<float>> data;  ///< by batch: a vec4 for each plane
+    std::vector<std::vector<float>> data;  ///< by batch: a vec4 for each plane or harmonic
     std::vector<int> counts;               ///< by batch
     std::array<double, 3> constant{};      ///< to be added to the shader's
     bool any = false;                      ///< whether any plane has a weight
@@ -106,9 +107,10 @@ class PlanePass {
   [[nodiscard]] bool serves_one_frame() const;
 
  private:
-  // Up to three planes that are fetched together, with one exponent or none.
+  // Planes that are fetched together, with one exponent or none: up to three, or s and x, y, z of
+  // the normal.
   struct Group {
-    std::array<int, 3> planes{-1, -1, -1};
+    std::array<int, 4> planes{-1, -1, -1, -1};
     std::array<unsigned, 3> channels{7, 7, 7};
   };
   // Groups that fetch from the same sheets. Sheets of the second role are numbered on from those of
@@ -116,29 +118,35 @@ class PlanePass {
   struct Batch {
     int role = 0;
     int planes_per_group = 1;
-    std::array<int, 3> sheets{-1, -1, -1};
+    std::array<int, 4> sheets{-1, -1, -1, -1};
     int exponent_sheet = -1;
     bool wide = false;
+    bool predicts = false;  // s · E(N)
     std::vector<Group> groups;
     [[nodiscard]] bool same_kind(const Batch& other) const;
     [[nodiscard]] int lookups() const { return planes_per_group + (exponent_sheet >= 0 ? 1 : 0); }
+    [[nodiscard]] int vectors() const;  // uniforms a group
     [[nodiscard]] int count() const { return static_cast<int>(groups.size()); }
   };
 
   static std::vector<Batch> group_planes(const PlaneSetDescription& description,
                                          const PlaneSheets& sheets);
+  static Batch prediction(const PlaneSetDescription& description, const PlaneSheets& sheets);
   [[nodiscard]] std::vector<int> sheets_with(const Batch& batch) const;
   [[nodiscard]] std::string samplers() const;
-  [[nodiscard]] std::string batch_text(std::size_t index, int groups) const;
+  [[nodiscard]] std::string weights_text(std::size_t index, int groups) const;
+  [[nodiscard]] std::string batch_names(std::size_t index) const;
   [[nodiscard]] std::string sheet_name(int sheet) const;
   static std::string place_text(const Group& group, const Batch& batch, int lookup,
                                 const PlaneSheets& sheets);
   static std::size_t plane_of(const Group& group, int slot);
   [[nodiscard]] bool is_raw(const Batch& batch) const {
-    return batch.exponent_sheet < 0 && !lookups_;
+    return batch.exponent_sheet < 0 && !lookups_ && !batch.predicts;
   }
   int fill_batch(std::size_t index, const FoldedLight& light, const FrameSlots& frames,
                  const PlaneSheets& sheets, double share, Weights& weights) const;
+  int fill_prediction(std::size_t index, const FoldedLight& light, const FrameSlots& frames,
+                      const PlaneSheets& sheets, double share, Weights& weights) const;
 
   bool lookups_ = false;  // are varyings
   std::vector<Batch> batches_;

@@ -9,9 +9,9 @@
 namespace relit::gles {
 namespace {
 
-constexpr const char* kBatchNames[] = {"BATCH_WEIGHTS",  "BATCH_PLANES",  "BATCH_MANTISSA",
-                                       "BATCH_SHEET_0",  "BATCH_SHEET_1", "BATCH_SHEET_2",
-                                       "BATCH_EXPONENTS"};
+constexpr const char* kBatchNames[] = {"BATCH_WEIGHTS", "BATCH_PLANES",   "BATCH_MANTISSA",
+                                       "BATCH_SHEET_0", "BATCH_SHEET_1",  "BATCH_SHEET_2",
+                                       "BATCH_SHEET_3", "BATCH_EXPONENTS"};
 
 std::string define(const std::string& name, const std::string& value) {
   return "#define " + name + " " + value + "\n";
@@ -25,6 +25,8 @@ std::string channel_names(unsigned channels) {
     if ((channels >> c & 1u) != 0) names += "rgb"[c];
   return names.empty() ? "r" : names;
 }
+
+std::string weights_name(std::size_t batch) { return "u_weight" + std::to_string(batch); }
 
 // Ten digits tell any two floats apart.
 std::string vector_of(const std::array<float, 4>& v) {
@@ -49,11 +51,15 @@ std::string PlanePass::samplers() const {
   return text + std::string(shaders::composite_head);
 }
 
-std::string PlanePass::batch_text(std::size_t index, int groups) const {
+std::string PlanePass::weights_text(std::size_t index, int groups) const {
+  return "uniform vec4 " + weights_name(index) + "[" +
+         std::to_string(groups * batches_[index].vectors()) + "];\n";
+}
+
+std::string PlanePass::batch_names(std::size_t index) const {
   const Batch& batch = batches_[index];
-  const std::string weights = "u_weight" + std::to_string(index);
   std::string text = define("BATCH_PLANES", std::to_string(batch.planes_per_group));
-  text += define("BATCH_WEIGHTS", weights);
+  text += define("BATCH_WEIGHTS", weights_name(index));
   text += define("BATCH_MANTISSA",
                  std::string(is_raw(batch) ? "raw" : "mantissa") + (batch.wide ? "10" : "8"));
   for (int i = 0; i < batch.planes_per_group; ++i)
@@ -61,8 +67,7 @@ std::string PlanePass::batch_text(std::size_t index, int groups) const {
                    sheet_name(batch.sheets[static_cast<std::size_t>(i)]));
   if (batch.exponent_sheet >= 0)
     text += define("BATCH_EXPONENTS", sheet_name(batch.exponent_sheet));
-  return text + "uniform vec4 " + weights + "[" + std::to_string(groups * batch.planes_per_group) +
-         "];\n";
+  return text;
 }
 
 std::string PlanePass::place_text(const Group& group, const Batch& batch, int lookup,
@@ -82,7 +87,7 @@ std::string PlanePass::text(PlaneTaps taps, std::span<const int> counts,
     const Batch& batch = batches_[b];
     if (counts[b] == 0) continue;
     const std::string name = "sum" + std::to_string(b) + "()";
-    text += batch_text(b, counts[b]);
+    text += weights_text(b, counts[b]) + batch_names(b);
     text += "vec3 " + name + " {\n  vec3 sum = vec3(0.0);\n  vec2 low, high;\n";
     for (int g = 0; g < counts[b]; ++g) {
       std::string names = define("GROUP", std::to_string(g)), after = undefine("GROUP");
@@ -99,7 +104,9 @@ std::string PlanePass::text(PlaneTaps taps, std::span<const int> counts,
             define(channels, channel_names(batch.groups[static_cast<std::size_t>(g)].channels[i]));
         after += undefine(channels);
       }
-      text += names + std::string(shaders::composite_group) + after;
+      text += names;
+      text += batch.predicts ? shaders::composite_predict : shaders::composite_group;
+      text += after;
     }
     text += "  return sum;\n}\n";
     for (const char* each : kBatchNames) text += undefine(each);
@@ -111,24 +118,29 @@ std::string PlanePass::text(PlaneTaps taps, std::span<const int> counts,
 PlanePass::LookupText PlanePass::lookup_text(const PlaneSheets& sheets) const {
   LookupText text;
   text.uniforms = samplers();
-  if (batches_.empty()) return text;
-  const Batch& batch = batches_.front();
-  text.uniforms += batch_text(0, batch.count());
   std::size_t varying = 0;
-  for (int g = 0; g < batch.count(); ++g) {
-    std::string names = define("GROUP", std::to_string(g)), after = undefine("GROUP");
-    for (int i = 0; i < batch.lookups(); ++i) {
-      const std::string v = "v" + std::to_string(varying++);
-      const std::string name =
-          i == batch.planes_per_group ? "GROUP_UV_E" : "GROUP_UV_" + std::to_string(i);
-      const std::string place =
-          place_text(batch.groups[static_cast<std::size_t>(g)], batch, i, sheets);
-      text.varyings += "VARYING vec2 " + v + ";\n";
-      text.assignments += "  " + v + " = " + place + ".xy + texel * " + place + ".zw;\n";
-      names += define(name, v);
-      after += undefine(name);
+  for (std::size_t b = 0; b < batches_.size(); ++b) {
+    const Batch& batch = batches_[b];
+    text.uniforms += weights_text(b, batch.count());
+    text.statements += batch_names(b);
+    for (int g = 0; g < batch.count(); ++g) {
+      std::string names = define("GROUP", std::to_string(g)), after = undefine("GROUP");
+      for (int i = 0; i < batch.lookups(); ++i) {
+        const std::string v = "v" + std::to_string(varying++);
+        const std::string name =
+            i == batch.planes_per_group ? "GROUP_UV_E" : "GROUP_UV_" + std::to_string(i);
+        const std::string place =
+            place_text(batch.groups[static_cast<std::size_t>(g)], batch, i, sheets);
+        text.varyings += "VARYING vec2 " + v + ";\n";
+        text.assignments += "  " + v + " = " + place + ".xy + texel * " + place + ".zw;\n";
+        names += define(name, v);
+        after += undefine(name);
+      }
+      text.statements += names;
+      text.statements += batch.predicts ? shaders::composite_predict : shaders::composite_unrolled;
+      text.statements += after;
     }
-    text.statements += names + std::string(shaders::composite_unrolled) + after;
+    for (const char* each : kBatchNames) text.statements += undefine(each);
   }
   return text;
 }

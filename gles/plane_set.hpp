@@ -18,7 +18,8 @@ struct PicturePlace {
 
 /// What stays the same of a PlaneView from frame to frame.
 struct PlaneDescription {
-  int bit_depth = 8;       ///< 8 or 10: mantissa_zero is 128 or 512; 10 bits take two bytes
+  int bit_depth = 8;  ///< 8, 10, or 16 for normals: mantissa_zero is 2^(bit_depth - 1); 10 and 16
+                      ///< bits take two bytes
   int mantissa_shift = 0;  ///< as PlaneView's
   PicturePlace mantissa;
   unsigned channels = 7;  ///< bits 0..2: of the light map, that the plane ever has a weight for
@@ -27,6 +28,9 @@ struct PlaneDescription {
   PicturePlace
       exponent;  ///< planes that share exponents give the same place, and are fetched together
 };
+
+/// The scale of normals' PlaneViews: their samples are 1 to 65535 for -1 to 1.
+inline constexpr float kNormalScale = 1.0f / 32767;
 
 /// How a light map is kept on the GPU.
 enum class LightMapFormat {
@@ -39,7 +43,14 @@ enum class LightMapFormat {
 struct PlaneSetDescription {
   int width = 0;  ///< of the light map, texels
   int height = 0;
-  std::vector<PlaneDescription> planes;  ///< in the model's order
+  std::vector<PlaneDescription> planes;  ///< in the model's order; a prediction's normals after it
+  /// The plane s of the prediction s · E(N), FoldedLight::prediction_plane; -1: none. It may have a
+  /// weight of its own, as any plane.
+  int prediction_plane = -1;
+  /// With a prediction, the first of three planes x, y, z of N, a unit normal in model space or
+  /// zero for each texel of the light map: 16 bits, neither exponents nor a shift, value =
+  /// kNormalScale · (m - 32768). The folded light has weights for them too: 0.
+  int normal_planes = -1;
   bool changes_every_frame =
       true;  ///< double-buffers the planes, so that an upload waits for no draw
   LightMapFormat format = LightMapFormat::kAuto;

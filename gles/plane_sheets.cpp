@@ -14,6 +14,7 @@ namespace {
 // The largest texture of the smallest machine; sheets do not grow beyond it elsewhere either,
 // because upload cost and cache behaviour gain nothing from it.
 constexpr int kSheetSide = 2048;
+constexpr std::size_t kNormalPlanes = 3;
 
 int shifted(int size, int shift) { return (size + (1 << shift) - 1) >> shift; }
 
@@ -51,9 +52,10 @@ Status PlaneSheets::describe(const PlaneSetDescription& d) {
     return fail(ErrorCode::kInvalid, "a light map of " + std::to_string(d.width) + "x" +
                                          std::to_string(d.height) + " texels; 1 to " +
                                          std::to_string(side) + " a side are possible");
-  if (d.planes.size() > limits::kPlanes)
+  const std::size_t most = limits::kPlanes + (d.normal_planes >= 0 ? kNormalPlanes : 0);
+  if (d.planes.size() > most)
     return fail(ErrorCode::kLimit, std::to_string(d.planes.size()) + " planes; at most " +
-                                       std::to_string(limits::kPlanes) + " are possible");
+                                       std::to_string(most) + " are possible");
   width_ = d.width;
   height_ = d.height;
   planes_ = d.planes;
@@ -61,10 +63,12 @@ Status PlaneSheets::describe(const PlaneSetDescription& d) {
   exponents_.resize(planes_.size());
   for (std::vector<PlaneState>& states : states_) states.resize(planes_.size());
   active_.resize(planes_.size());
+  RELIT_TRY(describe_prediction(d));
   for (std::size_t k = 0; k < planes_.size(); ++k) {
     const PlaneDescription& plane = planes_[k];
-    if ((plane.bit_depth != 8 && plane.bit_depth != 10) || plane.mantissa_shift < 0 ||
-        plane.mantissa_shift > 1 || plane.exponent_shift < 0 || plane.exponent_shift > 5)
+    const bool depth = is_normal(k) || plane.bit_depth == 8 || plane.bit_depth == 10;
+    if (!depth || plane.mantissa_shift < 0 || plane.mantissa_shift > 1 ||
+        plane.exponent_shift < 0 || plane.exponent_shift > 5)
       return fail(ErrorCode::kInvalid,
                   plane_name(k) +
                       ": bit depth must be 8 or 10, the mantissa's shift 0 or 1, the "
@@ -81,6 +85,43 @@ Status PlaneSheets::describe(const PlaneSetDescription& d) {
   }
   tile_exponents_.resize(tiles_.size());
   return {};
+}
+
+Status PlaneSheets::describe_prediction(const PlaneSetDescription& d) {
+  prediction_plane_ = d.prediction_plane;
+  normal_planes_ = d.normal_planes;
+  const auto count = static_cast<int>(d.planes.size());
+  const bool none = prediction_plane_ == -1 && normal_planes_ == -1;
+  const bool both = prediction_plane_ >= 0 && prediction_plane_ < count && normal_planes_ >= 0 &&
+                    normal_planes_ <= count - static_cast<int>(kNormalPlanes);
+  if (!none && (!both || is_normal(static_cast<std::size_t>(prediction_plane_))))
+    return fail(ErrorCode::kInvalid,
+                "prediction plane " + std::to_string(prediction_plane_) +
+                    " with normals from plane " + std::to_string(normal_planes_) + " on; of " +
+                    std::to_string(count) + " planes it must be one and they three others");
+  for (std::size_t k = 0; k < planes_.size(); ++k) {
+    const PlaneDescription& plane = planes_[k];
+    if (is_normal(k) && (plane.bit_depth != 16 || plane.mantissa_shift != 0 || plane.has_exponent))
+      return fail(ErrorCode::kInvalid, plane_name(k) +
+                                           ": normals have 16 bits a texel of the light map, and "
+                                           "no exponents");
+  }
+  return {};
+}
+
+bool PlaneSheets::is_normal(std::size_t plane) const {
+  const auto first = static_cast<std::size_t>(normal_planes_);
+  return normal_planes_ >= 0 && plane >= first && plane < first + kNormalPlanes;
+}
+
+bool PlaneSheets::can_predict(int slot) const {
+  if (prediction_plane_ < 0) return false;
+  const auto s = static_cast<std::size_t>(prediction_plane_);
+  const auto first = static_cast<std::size_t>(normal_planes_);
+  bool present = state(s, slot).present;
+  for (std::size_t k = first; k < first + kNormalPlanes; ++k)
+    present = present && state(k, slot).present;
+  return present;
 }
 
 void PlaneSheets::add_tile(const PlaneSetDescription& d, std::size_t plane, bool exponent) {
@@ -299,6 +340,9 @@ Status PlaneSheets::check_view(std::size_t k, const PlaneView& view) const {
     return fail(ErrorCode::kInvalid, plane_name(k) + ": its exponents are not as described");
   if (!std::isfinite(view.scale))
     return fail(ErrorCode::kInvalid, plane_name(k) + ": its scale is not a finite number");
+  // The shader has it as a literal.
+  if (is_normal(k) && view.scale != kNormalScale)
+    return fail(ErrorCode::kInvalid, plane_name(k) + ": the scale of a normal is 1/32767");
   return {};
 }
 

@@ -13,7 +13,8 @@ namespace relit::gles {
 
 /// The textures that planes are uploaded to: rectangles of decoded pictures packed into a few
 /// sheets of at most 2048² texels, one byte a texel (8-bit mantissas, exponents) or two (10-bit
-/// mantissas, low and high byte as they lie in memory). Sampled with nearest filtering.
+/// mantissas and the 16 bits of normals, low and high byte as they lie in memory). Sampled with
+/// nearest filtering.
 ///
 /// There are two slots of everything where planes change every frame, else one. A slot holds a
 /// frame, so that two can be blended, and an upload waits for no draw of the one before.
@@ -59,6 +60,11 @@ class PlaneSheets {
   [[nodiscard]] int slot_count() const { return slot_count_; }
   [[nodiscard]] unsigned channels(std::size_t plane) const { return planes_[plane].channels; }
   [[nodiscard]] std::size_t plane_count() const { return planes_.size(); }
+  /// As described.
+  [[nodiscard]] int prediction_plane() const { return prediction_plane_; }
+  [[nodiscard]] bool is_normal(std::size_t plane) const;
+  /// Whether a slot has everything that s · E(N) takes, s and the three planes of the normals.
+  [[nodiscard]] bool can_predict(int slot) const;
   [[nodiscard]] int sheet_count() const { return static_cast<int>(sheets_.size()); }
   /// (offset.xy, scale.xy) such that offset + scale × texel is the place's texture coordinate for
   /// the light map's texel (x+½, y+½).
@@ -95,6 +101,7 @@ class PlaneSheets {
   Status lay_out(const PlaneSetDescription& description, int max_texture_size);
   [[nodiscard]] std::size_t largest_region_bytes() const;
   Status describe(const PlaneSetDescription& description);
+  Status describe_prediction(const PlaneSetDescription& description);
   void add_tile(const PlaneSetDescription& description, std::size_t plane, bool exponent);
   void make_regions(const PlaneSetDescription& description, int limit);
   Status pack(int limit);
@@ -110,6 +117,7 @@ class PlaneSheets {
   const Device* device_ = nullptr;
   int slot_count_ = 1;
   std::vector<PlaneDescription> planes_;
+  int prediction_plane_ = -1, normal_planes_ = -1;
   int width_ = 0, height_ = 0;
   std::vector<Tile> tiles_;
   std::vector<Region> regions_;

@@ -16,6 +16,7 @@ extern const std::string_view composite_fused;
 extern const std::string_view composite_group;
 extern const std::string_view composite_head;
 extern const std::string_view composite_lookup_vert;
+extern const std::string_view composite_predict;
 extern const std::string_view composite_tail;
 extern const std::string_view composite_taps;
 extern const std::string_view composite_unrolled;

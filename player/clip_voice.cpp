@@ -20,7 +20,8 @@ Result<std::unique_ptr<ClipVoice>> ClipVoice::create(std::size_t clip, ClipDemux
   return voice;
 }
 
-Status ClipVoice::attach(const RelightOptions& options) {
+Status ClipVoice::attach(RelightOptions options) {
+  options.meshes = prefetcher_->meshes();
   RELIT_ASSIGN(relighter_, Relighter::create(prefetcher_->model(), prefetcher_->layers(), options));
   return {};
 }

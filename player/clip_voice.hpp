@@ -22,9 +22,9 @@ class ClipVoice {
                                                    std::shared_ptr<WorkerPool> pool,
                                                    const PrefetchOptions& options);
 
-  /// Makes the light map's part for a context, or for none. The light has to be set again. Errors:
-  /// those of Relighter::create().
-  Status attach(const RelightOptions& options);
+  /// Makes the light map's part for a context, or for none; the meshes are the clip's. The light
+  /// has to be set again. Errors: those of Relighter::create().
+  Status attach(RelightOptions options);
   /// Drops it; the context is current, or its device was abandoned.
   void detach() { relighter_.reset(); }
 
@@ -35,7 +35,8 @@ class ClipVoice {
     float blend = 0;
     bool late = false;  ///< the frame itself is not here, and `from` is the last picture
     [[nodiscard]] FrameMix mix() const {
-      return {&from->planes, to != nullptr ? &to->planes : nullptr, blend};
+      return {&from->planes, to != nullptr ? &to->planes : nullptr, blend, &from->pose,
+              to != nullptr ? &to->pose : nullptr};
     }
     bool operator==(const Frames&) const = default;
   };

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: MIT
+#include <optional>
+
 #include "decoders/coverage.hpp"
 #include "decoders/npy.hpp"
+#include "decoders/texel_normals.hpp"
 #include "player/command.hpp"
 
 namespace relit::player {
@@ -41,10 +44,19 @@ Status write_frames(ClipReader& clip, const Arguments& arguments) {
   RELIT_ASSIGN(NpyWriter writer,
                NpyWriter::create(arguments.output, NpyWriter::Type::kFloat32, shape));
   std::vector<float> transfer(coefficients * 3 * clip.model().height * clip.model().width);
+  std::optional<decoders::TexelNormals> normals;
+  std::vector<glm::vec3> frame_normals;
+  if (clip.model().prediction_plane >= 0) {
+    RELIT_ASSIGN(normals, decoders::TexelNormals::create(clip.meshes(), clip.model().width,
+                                                         clip.model().height));
+    frame_normals.resize(std::size_t{clip.model().height} * clip.model().width);
+  }
   ClipFrame frame;
   for (std::uint64_t k = range.first; k <= range.last; ++k) {
     RELIT_TRY(clip.frame(k, frame));
-    RELIT_TRY(decoders::reconstruct(frame.planes.planes(), clip.model(), clip.layers(), transfer));
+    if (normals) normals->compute(frame.pose, frame_normals);
+    RELIT_TRY(decoders::reconstruct(frame.planes.planes(), clip.model(), clip.layers(), transfer,
+                                    frame_normals));
     RELIT_TRY(writer.write(std::span<const float>(transfer)));
   }
   return writer.commit();

@@ -179,8 +179,10 @@ Result<Stream> Stream::open(const Arguments& arguments) {
   RELIT_ASSIGN(auto pool, WorkerPool::create(threads));
   RELIT_ASSIGN(stream.clip_, Prefetcher::create(std::move(demuxer), std::move(pool), options));
   if (light) {
+    RelightOptions relight;
+    relight.meshes = stream.clip_->meshes();
     RELIT_ASSIGN(stream.relighter_,
-                 Relighter::create(stream.clip_->model(), stream.clip_->layers(), {}));
+                 Relighter::create(stream.clip_->model(), stream.clip_->layers(), relight));
     RELIT_TRY(stream.relighter_->set_light(*light, options.layers));
   }
   stream.open_s_ = seconds_since(stream.began_);
@@ -204,7 +206,7 @@ Status Stream::show(std::uint64_t index) {
   const ClipFrame* frame = clip_->frame(index);
   if (frame == nullptr) return {};
   if (arguments_.fill) RELIT_TRY(fill_ring(index));
-  if (relighter_) RELIT_TRY(relighter_->composite({&frame->planes, nullptr, 0}));
+  if (relighter_) RELIT_TRY(relighter_->composite({&frame->planes, nullptr, 0, &frame->pose}));
   if (first_s_ == 0) first_s_ = seconds_since(began_);
   ++frames_;
   return {};

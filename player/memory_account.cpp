@@ -425,6 +425,11 @@ void MemoryAccount::add_composite(std::vector<MemoryTerm>& terms,
     spare_heap += quarter * texel;
     spare_gpu += 2 * quarter * texel;
   }
+  if (model_->prediction_plane >= 0) {
+    terms.push_back({"normals",
+                     "of the light map's texels, of two frames, that the model predicts by",
+                     FrameNormals::memory_bytes(contents_->meshes, *model_, on_cpu, on_gpu)});
+  }
   if (on_gpu) {
     terms.push_back({"plane textures", "planes as they were decoded, of two frames",
                      sheets_.cpu + sample_bytes(choice.light_map, plane_count_), sheets_.gpu});

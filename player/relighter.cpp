@@ -37,6 +37,16 @@ gles::PlaneSetDescription describe_planes(const container::ModelRecord& model,
       description.planes.push_back(describe(layers[l], plane, static_cast<int>(l)));
     }
   }
+  if (model.prediction_plane < 0) return description;
+  description.prediction_plane = model.prediction_plane;
+  description.normal_planes = static_cast<int>(description.planes.size());
+  for (int axis = 0; axis < 3; ++axis) {
+    gles::PlaneDescription normals;
+    normals.bit_depth = 16;
+    normals.channels = 0;
+    normals.mantissa = {3 * static_cast<int>(layers.size()), 0, axis * model.height};
+    description.planes.push_back(normals);
+  }
   return description;
 }
 
@@ -48,6 +58,11 @@ Result<std::unique_ptr<Relighter>> Relighter::create(const container::ModelRecor
   relighter->layers_ = layers;
   relighter->options_ = options;
   relighter->needs_ = PlaneNeeds(layers);
+  if (model.prediction_plane >= 0) {
+    if (options.meshes.empty())
+      return fail(ErrorCode::kInvalid, "a model that predicts from normals needs the meshes");
+    RELIT_ASSIGN(relighter->normals_, FrameNormals::create(options.meshes, model));
+  }
   RELIT_TRY(relighter->set_path(options.path));
   return relighter;
 }
@@ -61,7 +76,7 @@ Status Relighter::set_path(CompositePath path) {
     return {};
   }
   std::array<bool, kCompositePaths> available{};
-  if (options_.device != nullptr && model_->prediction_plane < 0) {
+  if (options_.device != nullptr) {
     const bool on_gpu = prepare(CompositePath::kTexture).has_value();
     available[static_cast<std::size_t>(CompositePath::kTexture)] = on_gpu;
     available[static_cast<std::size_t>(CompositePath::kFused)] =
@@ -116,6 +131,7 @@ Status Relighter::set_light(const decoders::Light& light, std::span<const std::u
   if (!folded) {
     folded_.weights.assign(needs_.planes().size(), Rgb{});
     folded_.view = {};
+    folded_.view.prediction_plane = model_->prediction_plane;
   }
   std::size_t plane = 0;
   for (std::size_t l = 0; l < layers_.size(); ++l) {
@@ -150,7 +166,7 @@ void Relighter::change_light() {
   FoldedLight light = folded_.view;
   bool same = quality_.half_size == half_size_ && weights_.size() == light.weights.size() &&
               light.constant == light_.constant && light.magnitude == light_.magnitude &&
-              light.irradiance == light_.irradiance;
+              (!predicts_ || light.irradiance == light_.irradiance);
   weights_.resize(light.weights.size());
   for (std::size_t k = 0; k < weights_.size(); ++k) {
     const Rgb weight = needs_.planes()[k] != 0 ? light.weights[k] : Rgb{};
@@ -159,12 +175,18 @@ void Relighter::change_light() {
   }
   light.weights = weights_;
   light_ = light;
+  const bool predicts = light.prediction_plane >= 0 &&
+                        needs_.planes()[static_cast<std::size_t>(light.prediction_plane)] != 0;
+  same = same && predicts == predicts_;
+  predicts_ = predicts;
+  if (!predicts_) light_.irradiance = {};
   half_size_ = quality_.half_size;
   if (!same) ++light_serial_;
 }
 
 void Relighter::forget() {
   done_.valid = false;
+  if (normals_) normals_->forget();
   for (FrameKey& slot : slots_) slot.valid = false;
 }
 
@@ -260,6 +282,7 @@ std::size_t Relighter::gpu_bytes() const {
 
 std::size_t Relighter::cpu_bytes() const {
   std::size_t bytes = sizeof(float) * (composite_.size() + faded_on_cpu_.size());
+  if (normals_) bytes += normals_->memory_bytes();
   if (compositor_) bytes += compositor_->cpu_bytes();
   for (const auto& uploader : uploaders_)
     if (uploader) bytes += uploader->cpu_bytes();

@@ -12,10 +12,12 @@
 #include "container/records.hpp"
 #include "decoders/composite.hpp"
 #include "decoders/plane_decoder.hpp"
+#include "decoders/pose.hpp"
 #include "gles/character_renderer.hpp"
 #include "gles/compositor.hpp"
 #include "gles/light_map.hpp"
 #include "gles/light_map_mixer.hpp"
+#include "player/frame_normals.hpp"
 #include "player/path_chooser.hpp"
 #include "player/plane_needs.hpp"
 
@@ -26,12 +28,16 @@ struct FrameMix {
   const decoders::FrameView* from = nullptr;
   const decoders::FrameView* to = nullptr;  ///< null: `from` alone
   float blend = 0;  ///< 0..1: light map = (1 - blend)·from's + blend·to's; 0: `from` alone
+  /// Of the same frames; needed where the model predicts from the meshes' normals.
+  const decoders::Pose* from_pose = nullptr;
+  const decoders::Pose* to_pose = nullptr;
 };
 
 struct RelightOptions {
   const gles::Device* device = nullptr;  ///< null: the CPU composites, and read() gives the result
   CompositePath path = CompositePath::kAuto;
   gles::LightMapFormat format = gles::LightMapFormat::kAuto;
+  std::span<const decoders::Mesh> meshes{};  ///< the clip's; borrowed, for models that predict
 };
 
 /// The planes of a model as the compositor sees them.
@@ -59,7 +65,7 @@ class Relighter {
   /// Records are borrowed; the device outlives this object. kAuto without a device is kCpu; with
   /// one it begins in texture space, or on the CPU where that cannot be, and measure() settles it.
   /// Errors: those of gles::Compositor for paths that were asked for by name; kInvalid for a path
-  /// on the GPU without a device.
+  /// on the GPU without a device, or a model that predicts without meshes; those of TexelNormals.
   static Result<std::unique_ptr<Relighter>> create(const container::ModelRecord& model,
                                                    std::span<const container::LayerRecord> layers,
                                                    const RelightOptions& options);
@@ -79,7 +85,7 @@ class Relighter {
 
   /// Brings the light map up to the moment. Steady state allocates nothing. Planes with a weight
   /// that a frame does not hold count as zero. Errors: kInvalid (no light yet, no frame, a blend
-  /// outside 0..1), kUnsupported (a prediction plane on the GPU), kEnvironment.
+  /// outside 0..1, no pose where the model predicts), kEnvironment.
   Status composite(const FrameMix& mix);
 
   /// Cross-fades to another clip's light map, `to`'s, whose composite() has been called: (1 -
@@ -167,9 +173,11 @@ class Relighter {
   [[nodiscard]] bool is_done(const FrameMix& mix) const;
   void note_done(const FrameMix& mix);
   void count_missing(const decoders::FrameView& frame);
+  [[nodiscard]] FoldedLight gpu_light() const;
+  Status check_poses(const FrameMix& mix) const;
   Status composite_on_cpu(const FrameMix& mix);
   Status composite_on_gpu(const FrameMix& mix);
-  Result<int> upload(const decoders::FrameView& frame, int other_slot);
+  Result<int> upload(const decoders::FrameView& frame, const decoders::Pose* pose, int other_slot);
   [[nodiscard]] int slot_of(const decoders::FrameView& frame) const;
   Result<gles::LightMap> upload_map(std::span<const float> values);
   Status fade_on_cpu(Relighter& to, float weight);
@@ -191,11 +199,13 @@ class Relighter {
   PlaneNeeds needs_;
   std::vector<Rgb> weights_;  // folded_'s, but zero where a plane is not needed
   FoldedLight light_;         // with those
+  bool predicts_ = false;     // whether s is needed for it
   bool half_size_ = false;
   std::uint64_t light_serial_ = 0;  // of light_ and half_size_
 
   Moment done_;
   RelightStats stats_;
+  std::optional<FrameNormals> normals_;  // of models that predict
 
   // On the CPU.
   std::vector<float> composite_;  // [3][height()][width()], divided by the magnitude
@@ -205,6 +215,9 @@ class Relighter {
   // On the GPU.
   std::unique_ptr<gles::Compositor> compositor_;
   std::array<FrameKey, 2> slots_;
+  std::vector<PlaneView> gpu_planes_;    // a frame's, then those of its normals
+  std::vector<std::uint8_t> gpu_needs_;  // by plane as well
+  std::vector<Rgb> gpu_weights_;
   gles::FrameSlots frames_;
   gles::FusedLight* fused_ = nullptr;
   std::optional<gles::LightMap> map_;  // of the last composite, once there is one

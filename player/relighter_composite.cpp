@@ -37,8 +37,9 @@ Result<FrameMix> Relighter::simplify(const FrameMix& mix) {
   if (mix.from == nullptr || !(mix.blend >= 0) || mix.blend > 1) {
     return fail(ErrorCode::kInvalid, "a composite needs a frame, and a blend from 0 to 1");
   }
-  if (mix.to == nullptr || mix.blend == 0 || mix.to == mix.from) return FrameMix{mix.from};
-  if (mix.blend == 1) return FrameMix{mix.to};
+  if (mix.to == nullptr || mix.blend == 0 || mix.to == mix.from)
+    return FrameMix{mix.from, nullptr, 0, mix.from_pose};
+  if (mix.blend == 1) return FrameMix{mix.to, nullptr, 0, mix.to_pose};
   return mix;
 }
 
@@ -87,6 +88,7 @@ Status Relighter::composite(const FrameMix& given) {
                                            std::to_string(weights_.size()));
     }
   }
+  RELIT_TRY(check_poses(mix));
   if (is_done(mix)) {
     ++stats_.skipped;
     return {};
@@ -99,6 +101,12 @@ Status Relighter::composite(const FrameMix& given) {
   ++stats_.composites;
   note_done(mix);
   return {};
+}
+
+Status Relighter::check_poses(const FrameMix& mix) const {
+  if (!predicts_ || (mix.from_pose != nullptr && (mix.to == nullptr || mix.to_pose != nullptr)))
+    return {};
+  return fail(ErrorCode::kInvalid, "a model that predicts from normals needs its frames' poses");
 }
 
 Status Relighter::composite_on_cpu(const FrameMix& mix) {
@@ -124,6 +132,17 @@ Status Relighter::composite_on_cpu(const FrameMix& mix) {
   job.light.weights = job_weights_;
   job.width = model_->width, job.height = model_->height;
   job.every = half_size_ ? 2 : 1;
+  if (predicts_) {
+    const auto s = static_cast<std::size_t>(light_.prediction_plane);
+    const int from = normals_->slot_of(mix.from->frame(), *mix.from_pose, -1);
+    job.predictions[0] = {static_cast<int>(s), normals_->normals(from, half_size_),
+                          mix.to != nullptr ? 1 - mix.blend : 1};
+    if (mix.to != nullptr) {
+      const int to = normals_->slot_of(mix.to->frame(), *mix.to_pose, from);
+      job.predictions[1] = {static_cast<int>(weights_.size() + s),
+                            normals_->normals(to, half_size_), mix.blend};
+    }
+  }
   job.out = std::span(composite_)
                 .first(std::size_t{3} * static_cast<std::size_t>(width()) *
                        static_cast<std::size_t>(height()));
@@ -152,7 +171,8 @@ int Relighter::slot_of(const decoders::FrameView& frame) const {
 }
 
 // Into the slot that has it, or the one that nobody needs: not `other_slot`.
-Result<int> Relighter::upload(const decoders::FrameView& frame, int other_slot) {
+Result<int> Relighter::upload(const decoders::FrameView& frame, const decoders::Pose* pose,
+                              int other_slot) {
   int slot = slot_of(frame);
   const bool keep = slot >= 0;
   if (!keep) slot = other_slot >= 0 ? 1 - other_slot : 1 - frames_.from;
@@ -161,32 +181,52 @@ Result<int> Relighter::upload(const decoders::FrameView& frame, int other_slot) 
     const bool there = keep && compositor_->holds(k, slot);
     if (needs_.planes()[k] != 0 && !frame.planes()[k].mantissa.empty() && !there) ++planes;
   }
+  const std::size_t first_normal = frame.planes().size();
+  const bool needs_normals = predicts_ && !(keep && compositor_->holds(first_normal, slot));
   FrameKey& key = slots_[static_cast<std::size_t>(slot)];
-  if (keep && planes == 0) return slot;
+  if (keep && planes == 0 && !needs_normals) return slot;
   key.valid = false;
-  RELIT_TRY(compositor_->upload(frame.planes(), slot, needs_.planes(), keep));
+  gpu_planes_.assign(frame.planes().begin(), frame.planes().end());
+  gpu_needs_.assign(needs_.planes().begin(), needs_.planes().end());
+  if (normals_) {
+    std::array<PlaneView, 3> normals;
+    // Slots are the frames' own, as theirs on the GPU are: the other frame's normals stay.
+    if (needs_normals) normals = normals_->planes(normals_->slot_of(frame.frame(), *pose, -1));
+    gpu_planes_.insert(gpu_planes_.end(), normals.begin(), normals.end());
+    gpu_needs_.insert(gpu_needs_.end(), 3, static_cast<std::uint8_t>(needs_normals));
+  }
+  RELIT_TRY(compositor_->upload(gpu_planes_, slot, gpu_needs_, keep));
   key.set(frame);
   ++stats_.uploads;
   stats_.planes_uploaded += planes;
   return slot;
 }
 
+// With weights for the planes of the normals too.
+FoldedLight Relighter::gpu_light() const {
+  FoldedLight light = light_;
+  light.weights = gpu_weights_;
+  return light;
+}
+
 Status Relighter::composite_on_gpu(const FrameMix& mix) {
   // Whichever frame is there already keeps its slot.
   const int to_slot = mix.to != nullptr ? slot_of(*mix.to) : -1;
-  RELIT_ASSIGN(const int from, upload(*mix.from, to_slot));
+  RELIT_ASSIGN(const int from, upload(*mix.from, mix.from_pose, to_slot));
   gles::FrameSlots frames{from, -1, 0};
   if (mix.to != nullptr) {
-    RELIT_ASSIGN(frames.to, upload(*mix.to, from));
+    RELIT_ASSIGN(frames.to, upload(*mix.to, mix.to_pose, from));
     frames.blend = mix.blend;
   }
   frames_ = frames;
   fused_ = nullptr;
+  gpu_weights_.assign(weights_.begin(), weights_.end());
+  if (normals_) gpu_weights_.insert(gpu_weights_.end(), 3, Rgb{});
   if (path_ == CompositePath::kFused) {
-    RELIT_ASSIGN(fused_, compositor_->fuse(light_, frames_));
+    RELIT_ASSIGN(fused_, compositor_->fuse(gpu_light(), frames_));
     return {};
   }
-  RELIT_ASSIGN(map_, compositor_->composite(light_, frames_, half_size_));
+  RELIT_ASSIGN(map_, compositor_->composite(gpu_light(), frames_, half_size_));
   return {};
 }
 
@@ -196,7 +236,7 @@ Result<gles::LightMap> Relighter::texture() {
     return fail(ErrorCode::kInvalid, "no light map has been composited on a GL device");
   }
   if (!map_) {
-    RELIT_ASSIGN(map_, compositor_->composite(light_, frames_, half_size_));
+    RELIT_ASSIGN(map_, compositor_->composite(gpu_light(), frames_, half_size_));
   }
   return *map_;
 }

@@ -73,8 +73,7 @@ inline constexpr FindingKind kFindingKinds[] = {
 
     {"MODL_CORRUPT", Severity::kError, "A field of MODL breaks a rule."},
     {"MODL_LIMIT", Severity::kError, "A field of MODL exceeds a limit."},
-    {"MODL_UNSUPPORTED", Severity::kError,
-     "A model is of a kind, or predicts in a way, that is not of this version."},
+    {"MODL_UNSUPPORTED", Severity::kError, "A model is of a kind that is not of this version."},
 
     {"LAYR_CORRUPT", Severity::kError, "A field of LAYR breaks a rule."},
     {"LAYR_LIMIT", Severity::kError, "A field of LAYR exceeds a limit."},

@@ -75,10 +75,6 @@ void StaticChecker::keep(const FindingPlace& place, PoseTrackRecord&& record) {
 }
 
 void StaticChecker::keep(const FindingPlace& place, ModelRecord&& record) {
-  if (record.prediction_plane != -1)
-    log_.add("MODL_UNSUPPORTED", place,
-             "prediction_plane is " + std::to_string(record.prediction_plane) +
-                 "; no version defines more than its place yet, so that it must be -1");
   models_.push_back({place, std::move(record)});
 }
 

@@ -1,4 +1,5 @@
-// light map = constant + sum over k of w[k] * mantissa_k(p) * 2^(E_k(p) - E_ref). Mantissas are normalised to
+// light map = constant + sum over k of w[k] * mantissa_k(p) * 2^(E_k(p) - E_ref), and s(p) * E(N(p)) where there
+// is a prediction. Mantissas are normalised to
 // [-1, 1) and the rest of each plane's factor is in its weight. The bias goes before the weight:
 // taken out of the sum it would cost half floats most of their bits.
 
@@ -25,12 +26,19 @@ float mantissa8(vec4 t) { return (byte(t.r) - 128.0) * (1.0 / 128.0); }
 float mantissa10(vec4 t) {
   return ((byte(t.HIGH_BYTE) - 2.0) * 256.0 + byte(t.LOW_BYTE)) * (1.0 / 512.0);
 }
+// Over 32768 instead of 32767, which half floats cannot tell apart, in steps of which none is subnormal.
+float normal16(vec4 t) {
+  return (byte(t.HIGH_BYTE) - 128.0 + byte(t.LOW_BYTE) * (1.0 / 256.0)) * (1.0 / 128.0);
+}
 #else
 float raw8(vec4 t) { return t.r; }
 float raw10(vec4 t) { return t.HIGH_BYTE * 256.0 + t.LOW_BYTE; }
 float mantissa8(vec4 t) { return t.r * (255.0 / 128.0) - 1.0; }
 float mantissa10(vec4 t) {
   return t.HIGH_BYTE * (255.0 * 256.0 / 512.0) + (t.LOW_BYTE * (255.0 / 512.0) - 1.0);
+}
+float normal16(vec4 t) {
+  return t.HIGH_BYTE * (255.0 * 256.0 / 32767.0) + (t.LOW_BYTE * (255.0 / 32767.0) - 32768.0 / 32767.0);
 }
 #endif
 

@@ -54,11 +54,11 @@ struct Encoded {
 inline Result<Encoded> encode(const Clip& clip, const CodingOptions& options,
                               const ModelIds& ids = {7, 3, 10, 20, 0}) {
   RELIT_ASSIGN(RangeScan scan, RangeScan::create(clip.shape, options));
-  for (const auto& frame : clip.frames) RELIT_TRY(scan.add_frame(frame));
+  for (const auto& frame : clip.frames) RELIT_TRY(scan.add_frame({frame}));
   RELIT_ASSIGN(PlaneEncoder encoder, PlaneEncoder::begin(std::move(scan), ids));
   Encoded encoded;
   for (const auto& frame : clip.frames) {
-    RELIT_TRY(encoder.encode_frame(frame));
+    RELIT_TRY(encoder.encode_frame({frame}));
     while (auto segment = encoder.take_segment()) encoded.segments.push_back(std::move(*segment));
   }
   RELIT_TRY(encoder.finish());

@@ -8,12 +8,25 @@ using namespace relit;
 using namespace relit::bake;
 using container::Chroma;
 
+namespace {
+
+PlaneSplit colour_planes(int order, int width, int height, const CodingOptions& options) {
+  return PlaneSplit::colour({order, width, height}, options);
+}
+
+}  // namespace
+
 TEST_CASE("open options take the best value for the rest") {
   const auto plain = resolve({});
   REQUIRE(plain);
   CHECK(*plain->bit_depth == 10);
-  CHECK(*plain->chroma == Chroma::k420);
+  CHECK(plain->planes == Planes::kPrincipal);
+  CHECK(*plain->chroma == Chroma::kLuma);
+  CHECK(*plain->crf == 18);
   CodingOptions o;
+  o.planes = Planes::kColour;
+  CHECK(*resolve(o)->chroma == Chroma::k420);
+  o = {};
   o.codec = "mpeg4";
   CHECK(*resolve(o)->bit_depth == 8);
   o.codec = "ffv1";
@@ -22,6 +35,10 @@ TEST_CASE("open options take the best value for the rest") {
   o = {};
   o.exponent_block = 16;
   CHECK(*resolve(o)->bit_depth == 8);
+  CHECK(resolve(o)->planes == Planes::kColour);
+  o = {};
+  o.lossless = true;
+  CHECK(resolve(o)->planes == Planes::kColour);
   CHECK(resolve(paper_options()));
 }
 
@@ -71,16 +88,18 @@ TEST_CASE("components and RGB are each other's inverse") {
 }
 
 TEST_CASE("a layer holds a band, in rows that the smallest machines can take") {
-  const auto options = resolve({});
+  CodingOptions colour;
+  colour.planes = Planes::kColour;
+  const auto options = resolve(colour);
   REQUIRE(options);
-  const auto plans = plan_layers(3, 500, 130, *options, {1, 5, 9});
+  const auto plans = plan_layers(colour_planes(3, 500, 130, *options), *options, {1, 5, 9});
   REQUIRE(plans);
   REQUIRE(plans->size() == 4);
   const int columns[] = {1, 3, 3, 4}, rows[] = {1, 1, 2, 2};
   for (std::size_t l = 0; l < 4; ++l) {
     const LayerPlan& plan = (*plans)[l];
-    CHECK(plan.coefficients.size() == 2 * l + 1);
-    CHECK(plan.coefficients[0] == static_cast<int>(l * l));
+    CHECK(plan.tiles.size() == 2 * l + 1);
+    CHECK(plan.tiles[0] == static_cast<int>(l * l));
     CHECK(plan.record.coded_width == 512 * columns[l]);
     CHECK(plan.record.coded_height == 144 * rows[l]);
     CHECK(plan.record.id == 5 + l);
@@ -98,8 +117,8 @@ TEST_CASE("pictures and light maps that are too large are refused") {
   o.layout = Layout::kGrid;
   const auto options = resolve(o);
   REQUIRE(options);
-  CHECK(plan_layers(3, 4096, 4096, *options, {}));
-  CHECK(!plan_layers(3, 4097, 16, *options, {}));
-  CHECK(!plan_layers(3, 0, 16, *options, {}));
-  CHECK(!plan_layers(4, 16, 16, *options, {}));
+  CHECK(plan_layers(colour_planes(3, 4096, 4096, *options), *options, {}));
+  CHECK(!plan_layers(colour_planes(3, 4097, 16, *options), *options, {}));
+  CHECK(!plan_layers(colour_planes(3, 0, 16, *options), *options, {}));
+  CHECK(!plan_layers(colour_planes(4, 16, 16, *options), *options, {}));
 }

@@ -67,7 +67,9 @@ Checked require_valid(const Mesh& m, const ChartPackOptions& options) {
   // Texels that a bilinear fetch reads, of two charts, are apart; and every chart covers a texel.
   std::vector<int> reader(static_cast<std::size_t>(options.width * options.height), -1);
   std::set<std::uint32_t> covering;
-  for (const TexelSample& s : rasterize_atlas(uv, corners, options.width, options.height)) {
+  const auto samples = decoders::rasterize_atlas(uv, corners, options.width, options.height);
+  REQUIRE(samples);
+  for (const TexelSample& s : *samples) {
     if (s.covered) covering.insert(charts.of_triangle[s.triangle]);
   }
   std::set<std::uint32_t> with_area;

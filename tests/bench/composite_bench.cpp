@@ -72,14 +72,13 @@ struct Scene {
       weights.push_back(weight);
     }
     if (content.prediction) {
-      job.light.prediction_plane = 0;
       job.light.irradiance.fill({0.3f, 0.2f, 0.1f});
       normals.assign(texels, glm::vec3(0.6f, 0.0f, 0.8f));
+      job.predictions[0] = {0, normals, 1};
     }
     job.planes = planes;
     job.light.weights = weights;
     job.width = job.height = side;
-    job.normals = normals;
     job.out = out;
   }
 };

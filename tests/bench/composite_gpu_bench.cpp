@@ -23,11 +23,13 @@ struct Content {
   int bit_depth;
   int exponent_shift;  ///< -1: none
   bool one_channel = true;
+  bool predicts = false;  ///< by the first plane
 };
 
 /// Planes as the components of one picture, tiles side by side, as a decoder leaves them.
 struct Scene {
   std::vector<std::uint8_t> components[3], exponents;
+  std::vector<std::uint16_t> normals;
   std::vector<PlaneView> planes;
   std::vector<Rgb> weights;
   FoldedLight light;
@@ -74,7 +76,34 @@ struct Scene {
       if (!c.one_channel) weight = {0.1f, 0.05f, -0.05f};
       weights.push_back(weight);
     }
+    if (c.predicts) predict(c.side);
     light.weights = weights;
+  }
+
+  /// The first plane becomes s; its normals lie one below the other in a picture of their own.
+  void predict(int side) {
+    const auto texels = static_cast<std::size_t>(side) * static_cast<std::size_t>(side);
+    normals.resize(3 * texels);
+    for (std::size_t i = 0; i < normals.size(); ++i)
+      normals[i] = static_cast<std::uint16_t>(32768 + (i * 37) % 18000);
+    description.prediction_plane = light.prediction_plane = 0;
+    description.normal_planes = static_cast<int>(planes.size());
+    weights[0] = {};
+    for (Rgb& row : light.irradiance) row = {0.3f, 0.2f, 0.1f};
+    for (int i = 0; i < 3; ++i) {
+      PlaneView view;
+      const std::uint16_t* first = normals.data() + static_cast<std::size_t>(i) * texels;
+      view.mantissa = {reinterpret_cast<const std::uint8_t*>(first), 2 * std::ptrdiff_t{side}, side,
+                       side, 2};
+      view.mantissa_zero = 32768;
+      view.scale = kNormalScale;
+      planes.push_back(view);
+      PlaneDescription plane;
+      plane.bit_depth = 16;
+      plane.mantissa = {3, 0, i * side};
+      description.planes.push_back(plane);
+      weights.push_back({});
+    }
   }
 };
 
@@ -204,7 +233,7 @@ Status measure(const Device& device, const Content& content) {
     cpu.push_back(cost.cpu_s / least.cpu_s);
     costs.push_back(cost.wall_s);
   }
-  std::printf("%-34s %dx%d: %.2f of upload and the same fetches (processor time %.2f), %.2f ms\n",
+  std::printf("%-42s %dx%d: %.2f of upload and the same fetches (processor time %.2f), %.2f ms\n",
               content.name, content.side, content.side, median(wall), median(cpu),
               1e3 * median(costs));
   return {};
@@ -220,7 +249,10 @@ Status run() {
         Content{"16 RGB tiles", 512, 16, 8, -1},
         Content{"48 principal planes", 512, 16, 8, -1, false},
         Content{"16 RGB tiles, 16x16 blocks", 512, 16, 8, 4},
-        Content{"16 RGB tiles, 10 bit", 512, 16, 10, -1}})
+        Content{"16 RGB tiles, 10 bit", 512, 16, 10, -1},
+        Content{"15 principal planes, 10 bit", 512, 5, 10, -1, false},
+        Content{"prediction and 14 principal planes, 10 bit", 128, 5, 10, -1, false, true},
+        Content{"prediction and 14 principal planes, 10 bit", 512, 5, 10, -1, false, true}})
     RELIT_TRY(measure(*device, content));
   return {};
 }

@@ -10,6 +10,7 @@
 #include "bake_minimal/pose_quantizer.hpp"
 #include "bake_minimal/stream_encoder.hpp"
 #include "bake_minimal/vertex_quantizer.hpp"
+#include "decoders/texel_normals.hpp"
 
 namespace relit::conformance {
 
@@ -61,14 +62,50 @@ void take(bake::PlaneEncoder& encoder, Encoded& encoded) {
   while (auto segment = encoder.take_segment()) encoded.segments.push_back(std::move(*segment));
 }
 
+/// The normals of the quad's texels, frame by frame.
+std::vector<std::vector<glm::vec3>> quad_normals(const FigureOptions& o) {
+  const SkeletonRecord skeleton = two_joints();
+  const std::vector<decoders::Mesh> meshes{
+      must(decoders::decode_mesh(quad(), skeleton.palette.size(), 0))};
+  const PoseTrackRecord record = bending(o.ids);
+  auto track = must(decoders::PoseTrack::create(skeleton, record, meshes));
+  const auto count = static_cast<std::uint32_t>(o.frames);
+  must(track.add_packet(pose_chunk(record, 3, 0, count).data, 0, count));
+  auto texels = must(decoders::TexelNormals::create(meshes, o.width, o.height));
+  std::vector<std::vector<glm::vec3>> frames;
+  decoders::Pose pose;
+  for (int f = 0; f < o.frames; ++f) {
+    must(track.sample(f, pose));
+    frames.emplace_back(static_cast<std::size_t>(o.width) * static_cast<std::size_t>(o.height));
+    texels.compute(pose, frames.back());
+  }
+  return frames;
+}
+
+bake::PlaneSplit split(const FigureOptions& o, const bake::CodingOptions& coding,
+                       std::span<const std::vector<glm::vec3>> normals) {
+  const bake::TransferShape shape{o.order, o.width, o.height};
+  if (coding.planes == bake::Planes::kColour) return bake::PlaneSplit::colour(shape, coding);
+  const std::vector<std::uint8_t> all(shape.texels(), 1);
+  bake::PrincipalAnalysis analysis(shape, coding.predict, all);
+  for (int f = 0; f < o.frames; ++f)
+    must(analysis.add_frame({transfer(o, f), normals[static_cast<std::size_t>(f)]}));
+  return bake::PlaneSplit::principal(shape, analysis.finish(coding.principal_count), all);
+}
+
 Encoded encode(const FigureOptions& o) {
-  auto scan = must(bake::RangeScan::create({o.order, o.width, o.height}, o.coding));
-  for (int f = 0; f < o.frames; ++f) must(scan.add_frame(transfer(o, f)));
+  const bake::CodingOptions coding = must(bake::resolve(o.coding));
+  const auto normals = quad_normals(o);
+  auto scan = must(bake::RangeScan::create(split(o, coding, normals), coding));
+  const auto frame = [&](int f) -> std::span<const glm::vec3> {
+    return normals[static_cast<std::size_t>(f)];
+  };
+  for (int f = 0; f < o.frames; ++f) must(scan.add_frame({transfer(o, f), frame(f)}));
   bake::ModelIds ids{o.ids.model, o.ids.clip, o.ids.first_layer, o.ids.first_track, 0};
   auto encoder = must(bake::PlaneEncoder::begin(std::move(scan), ids));
   Encoded encoded;
   for (int f = 0; f < o.frames; ++f) {
-    must(encoder.encode_frame(transfer(o, f)));
+    must(encoder.encode_frame({transfer(o, f), frame(f)}));
     take(encoder, encoded);
   }
   must(encoder.finish());

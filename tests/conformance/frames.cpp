@@ -14,6 +14,7 @@
 #include "decoders/mesh.hpp"
 #include "decoders/plane_decoder.hpp"
 #include "decoders/pose.hpp"
+#include "decoders/texel_normals.hpp"
 
 namespace relit::conformance {
 
@@ -144,7 +145,9 @@ ordered_json frame_json(ModelTracks& m, std::uint64_t frame, std::vector<float>&
   }
   if (!any) return nullptr;
   ordered_json json{{"planes", planes}, {"coefficients", nullptr}};
-  if (!status || !decoders::reconstruct(view.planes(), m.model, m.layers, transfer)) return json;
+  ModelRecord linear = m.model;
+  linear.prediction_plane = -1;
+  if (!status || !decoders::reconstruct(view.planes(), linear, m.layers, transfer)) return json;
   const std::size_t texels = std::size_t{m.model.width} * m.model.height;
   json["coefficients"] = ordered_json::array();
   for (const auto& [x, y] : probe_texels(m.model)) {
@@ -157,17 +160,41 @@ ordered_json frame_json(ModelTracks& m, std::uint64_t frame, std::vector<float>&
   return json;
 }
 
-ordered_json model_json(ModelTracks& m, std::uint64_t frame_count) {
+/// Adds the normals of the probe texels to the frames of a model that predicts.
+Status add_normals(const Decoding& d, const ModelRecord& model, ordered_json& frames) {
+  RELIT_ASSIGN(auto texels, decoders::TexelNormals::create(d.meshes, model.width, model.height));
+  const auto poses = std::find_if(d.poses.begin(), d.poses.end(), [&](const ClipPoses& p) {
+    return p.record.clip_id == model.clip_id;
+  });
+  std::vector<glm::vec3> normals(std::size_t{model.width} * model.height);
+  decoders::Pose pose;
+  for (std::size_t f = 0; f < frames.size(); ++f) {
+    if (frames[f].is_null()) continue;
+    ordered_json& probes = frames[f]["normals"];
+    if (poses == d.poses.end() || !poses->known[f] ||
+        !poses->track.sample(static_cast<double>(f), pose)) {
+      probes = nullptr;
+      continue;
+    }
+    texels.compute(pose, normals);
+    for (const auto& [x, y] : probe_texels(model)) {
+      const glm::vec3& n =
+          normals[static_cast<std::size_t>(y) * model.width + static_cast<std::size_t>(x)];
+      probes.push_back({number(n.x), number(n.y), number(n.z)});
+    }
+  }
+  return {};
+}
+
+Result<ordered_json> model_json(const Decoding& d, ModelTracks& m, std::uint64_t frame_count) {
   std::vector<float> transfer(m.model.mean.size() * 3 * m.model.width * m.model.height);
   ordered_json frames = ordered_json::array();
-  // Without the posed normals at its texels a model that predicts has to be refused.
-  const bool refused = m.model.prediction_plane >= 0;
-  for (std::uint64_t f = 0; f < frame_count; ++f)
-    frames.push_back(refused ? ordered_json() : frame_json(m, f, transfer));
-  return {{"model", m.model.id},
-          {"clip", m.model.clip_id},
-          {"probe_texels", probe_texels(m.model)},
-          {"frames", frames}};
+  for (std::uint64_t f = 0; f < frame_count; ++f) frames.push_back(frame_json(m, f, transfer));
+  if (m.model.prediction_plane >= 0) RELIT_TRY(add_normals(d, m.model, frames));
+  return ordered_json{{"model", m.model.id},
+                      {"clip", m.model.clip_id},
+                      {"probe_texels", probe_texels(m.model)},
+                      {"frames", frames}};
 }
 
 ordered_json pose_json(const Decoding& d, const ClipPoses& p) {
@@ -207,7 +234,8 @@ Result<ordered_json> decode_frames(std::unique_ptr<ByteSource> source) {
       {"hash", "crc32"}, {"models", ordered_json::array()}, {"poses", ordered_json::array()}};
   for (ModelTracks& m : d.models) {
     const ClipRecord& clip = *d.contents.find_clip(m.model.clip_id);
-    json["models"].push_back(model_json(m, clip.frame_count));
+    RELIT_ASSIGN(ordered_json model, model_json(d, m, clip.frame_count));
+    json["models"].push_back(std::move(model));
   }
   for (const ClipPoses& p : d.poses) json["poses"].push_back(pose_json(d, p));
   return json;

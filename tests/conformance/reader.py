@@ -440,7 +440,7 @@ def show_model(file, model, count):
     probes, shown = [[0, 0], [w // 3, h // 2], [w // 2, h // 3], [w - 1, h - 1]], [None] * count
     matrices = [p["matrix"] for layer in model["layers"] for p in layer["planes"]]
     for s in file.segments:
-        if s["clip"] != model["clip"] or model["prediction_plane"] >= 0: continue   # unsupported
+        if s["clip"] != model["clip"]: continue
         layers = [show_layer(file, layer, s, probes) for layer in model["layers"]]
         for i, planes in zip(range(s["first_frame"], count), zip(*layers)):
             planes, texels = sum(planes, []), None

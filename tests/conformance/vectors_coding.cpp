@@ -113,6 +113,43 @@ void add_exponents(Vectors& vectors) {
                      }});
 }
 
+FigureOptions principal(const char* codec, int order, bool predict) {
+  FigureOptions o = coded({codec, 10, Chroma::kLuma});
+  o.order = order;
+  o.coding.planes = bake::Planes::kPrincipal;
+  o.coding.predict = predict;
+  return o;
+}
+
+/// Moves the quad's chart to the texels from `least` to 13 of 16.
+Draft charted(const FigureOptions& options, int least) {
+  Draft draft = figure(options);
+  container::VertexStream& uv = draft.meshes[0].streams[1];
+  const float origin = static_cast<float>(least) / 16;
+  uv.offset = {origin, origin, 0};
+  uv.scale = {(13.0f / 16 - origin) / 65535, (13.0f / 16 - origin) / 65535, 1};
+  return draft;
+}
+
+void add_principal(Vectors& vectors) {
+  const auto add = [&](const std::string& name, const std::string& text, auto make) {
+    vectors.push_back({name, text, Outcome::kWhole, {}, [make] { return assemble(make()); }});
+  };
+  add("principal-planes", "principal planes of all of the transfer",
+      [] { return figure(principal("ffv1", 2, false)); });
+  for (const int order : {0, 1, 2, 3}) {
+    add("prediction-order-" + std::to_string(order),
+        "a prediction, and principal planes of what it leaves, order " + std::to_string(order),
+        [order] { return figure(principal("ffv1", order, true)); });
+  }
+  add("prediction-h264", "likewise in H.264", [] { return figure(principal("h264", 2, true)); });
+  add("prediction-hevc", "likewise in HEVC", [] { return figure(principal("hevc", 2, true)); });
+  add("prediction-touched", "a prediction where texels touch a chart that they do not lie in",
+      [] { return charted(principal("ffv1", 1, true), 6); });
+  add("prediction-fringe", "a prediction where texels are beside a chart",
+      [] { return charted(principal("ffv1", 1, true), 7); });
+}
+
 void add_orders(Vectors& vectors) {
   for (const int order : {0, 1, 2, 3}) {
     for (const bool grid : {false, true}) {
@@ -172,6 +209,7 @@ void add_codings(Vectors& vectors) {
   add_codecs(vectors);
   add_exponents(vectors);
   add_orders(vectors);
+  add_principal(vectors);
   add_sizes(vectors);
   add_order_of_packets(vectors);
 }

@@ -141,8 +141,8 @@ void add_clips(Vectors& vectors) {
       segment.chunks.back().track_id = 3;
     }
   });
-  from_draft(vectors, "model-prediction", "a prediction plane, whose time has not come",
-             faulty({"MODL_UNSUPPORTED"}), [](Draft& d) { d.models[0].prediction_plane = 0; });
+  good(vectors, "model-prediction", "a plane that is both a prediction's and the matrix's",
+       [](Draft& d) { d.models[0].prediction_plane = 0; });
 }
 
 void add_values(Vectors& vectors) {

@@ -86,9 +86,8 @@ void add_dangling(Vectors& vectors) {
          [](Draft& d) { d.layers[0].planes[0].mantissa_rect.width = 15; });
   broken(vectors, "matrix-beyond-order", "an entry for a coefficient beyond the model's order",
          [](Draft& d) { d.layers[0].planes[0].matrix[0].coefficient = 1; });
-  broken(
-      vectors, "prediction-beyond-planes", "a prediction from a plane that is not there",
-      [](Draft& d) { d.models[0].prediction_plane = 7; }, "MODL_UNSUPPORTED");
+  broken(vectors, "prediction-beyond-planes", "a prediction from a plane that is not there",
+         [](Draft& d) { d.models[0].prediction_plane = 7; });
   from_static_draft(vectors, "video-samples-limit",
                     "more samples of video than any machine decodes", "REF_LIMIT",
                     [](Draft& d) { d.clips[0].tick_rate.num = 0x7FFFFFFF; });

@@ -64,7 +64,7 @@ struct Scene {
   std::vector<Samples> samples;
   std::vector<PlaneView> planes;
   std::vector<Rgb> weights;
-  std::vector<glm::vec3> normals;
+  std::array<std::vector<glm::vec3>, 2> normals;
   std::vector<float> out;
   CompositeJob job;
 
@@ -95,11 +95,13 @@ struct Scene {
     planes.push_back(plane);
     return planes.back();
   }
-  void predict(Random& random, int plane) {
-    job.light.prediction_plane = plane;
+  /// By the first or the second of the predictions.
+  void predict(Random& random, int plane, std::size_t which = 0, float share = 1) {
+    job.predictions[which].plane = plane;
+    job.predictions[which].share = share;
     std::normal_distribution<float> normal;
     for (int i = 0; i < job.width * job.height; ++i) {
-      normals.push_back(
+      normals[which].push_back(
           glm::normalize(glm::vec3(normal(random), normal(random), normal(random) + 1e-3f)));
     }
     for (std::size_t n = 0; n < 9; ++n) {
@@ -110,7 +112,7 @@ struct Scene {
     out.assign(static_cast<std::size_t>(3 * job.width * job.height), -7e33f);
     job.planes = planes;
     job.light.weights = weights;
-    job.normals = normals;
+    for (std::size_t i = 0; i < 2; ++i) job.predictions[i].normals = normals[i];
     job.out = out;
     const Status status = job.validate();
     INFO((status ? std::string() : status.error().message));
@@ -336,6 +338,19 @@ TEST_CASE("every kernel keeps the bound with a prediction") {
   }
 }
 
+TEST_CASE("every kernel keeps the bound with the predictions of two frames that blend") {
+  Random random(16);
+  for (int round = 0; round < 20; ++round) {
+    Scene scene(pick(random, 1, 35), pick(random, 1, 6));
+    for (int k = 0; k < 6; ++k) scene.add(random, round % 2 == 0 ? 8 : 10, 0, -1);
+    const float blend = uniform(random, 0, 1);
+    scene.predict(random, pick(random, 0, 2), 0, 1 - blend);
+    scene.predict(random, pick(random, 3, 5), 1, blend);
+    scene.finish();
+    check_all_kernels(scene);
+  }
+}
+
 TEST_CASE("a prediction alone is s times the irradiance of the normal") {
   Random random(7);
   Scene scene(9, 1);
@@ -347,7 +362,7 @@ TEST_CASE("a prediction alone is s times the irradiance of the normal") {
   scene.job.run();
   for (std::size_t i = 0; i < 9; ++i) {
     std::array<double, 9> y{};
-    evaluate_sh(2, glm::dvec3(scene.normals[i]), y);
+    evaluate_sh(2, glm::dvec3(scene.normals[0][i]), y);
     for (std::size_t c = 0; c < 3; ++c) {
       double expected = 0;
       for (std::size_t n = 0; n < 9; ++n) {
@@ -474,9 +489,9 @@ TEST_CASE("jobs that would read or write elsewhere are refused") {
   CHECK(refused([](CompositeJob& j, Planes&, Weights&) { j.height = 1 << 30; }));
   CHECK(refused([](CompositeJob& j, Planes&, Weights&) { j.out = j.out.first(10); }));
   CHECK(refused([](CompositeJob& j, Planes&, Weights&) { j.planes = j.planes.first(1); }));
-  CHECK(refused([](CompositeJob& j, Planes&, Weights&) { j.light.prediction_plane = 2; }));
-  CHECK(refused([](CompositeJob& j, Planes&, Weights&) { j.light.prediction_plane = -2; }));
-  CHECK(refused([](CompositeJob& j, Planes&, Weights&) { j.light.prediction_plane = 0; }));
+  CHECK(refused([](CompositeJob& j, Planes&, Weights&) { j.predictions[0].plane = 2; }));
+  CHECK(refused([](CompositeJob& j, Planes&, Weights&) { j.predictions[1].plane = -2; }));
+  CHECK(refused([](CompositeJob& j, Planes&, Weights&) { j.predictions[0].plane = 0; }));
   CHECK(refused([](CompositeJob& j, Planes&, Weights&) { j.light.constant[1] = NAN; }));
   CHECK(refused([](CompositeJob& j, Planes&, Weights&) { j.light.irradiance[8][1] = INFINITY; }));
   CHECK(refused([](CompositeJob&, Planes&, Weights& w) { w[0][2] = NAN; }));

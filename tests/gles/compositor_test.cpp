@@ -28,19 +28,6 @@ double bound(const Device& device, double passes, const Scene::Reference& r, std
          passes * std::exp2(-10) * r.absolute_sum;
 }
 
-// What the player counts on, relative to the peak.
-double required(const Device& device) {
-  switch (device.profile()) {
-    case Profile::kEs3:
-      return 1.5e-3;
-    case Profile::kEs2:
-      return 4e-3;
-    case Profile::kEs2Mediump:
-      break;
-  }
-  return 2e-2;
-}
-
 void check_case(const Case& c, const BackendOptions& options = {}) {
   const Scene scene(c);
   const Scene::Reference reference = scene.reference();
@@ -423,7 +410,7 @@ TEST_CASE("compositor refuses what was not described", "[gles][es2]") {
     REQUIRE(c.upload(scene.views_));
     FoldedLight light = scene.light_;
     light.prediction_plane = 0;
-    CHECK(c.composite(light).error().code == ErrorCode::kUnsupported);
+    CHECK(c.composite(light).error().code == ErrorCode::kInvalid);
     light = scene.light_;
     light.constant[1] = INFINITY;
     CHECK_FALSE(c.composite(light));

@@ -8,6 +8,7 @@
 #include "tests/gles/backends.hpp"
 #include "tests/gles/drawing.hpp"
 #include "tests/gles/plane_scene.hpp"
+#include "tests/gles/predicted_scene.hpp"
 #include "tests/results.hpp"
 #include "tests/test.hpp"
 
@@ -21,14 +22,20 @@ constexpr int kSide = 96;
 
 // Values between 0.25 and 0.95, so that the sRGB curve is nowhere steep: 0.6 and terms that sum to
 // 0.35 at most.
-Scene tame(const Case& c) {
-  Scene scene(c);
+template <class AnyScene>
+void tame(AnyScene& scene) {
   const auto share = static_cast<float>(0.35 / scene.reference().absolute_sum);
   for (Rgb& weight : scene.weights_)
     for (float& w : weight) w *= share;
+  for (Rgb& row : scene.light_.irradiance)
+    for (float& c : row) c *= share;
   scene.light_.constant = {0.6f, 0.55f, 0.5f};
   scene.light_.magnitude = 1;
   scene.light_.weights = scene.weights_;
+}
+Scene tame_scene(const Case& c) {
+  Scene scene(c);
+  tame(scene);
   return scene;
 }
 
@@ -73,13 +80,10 @@ int largest_step(const std::vector<std::uint8_t>& a, const std::vector<std::uint
 // at most one apart.
 constexpr int kOneLevel = 1;
 
-void check_case(const Case& c) {
-  const Scene from = tame(c);
-  Case other = c;
-  other.seed = 1;
-  Scene to = tame(other);
+template <class AnyScene>
+void check_scenes(const char* name, const AnyScene& from, const AnyScene& to) {
   on_each_backend([&](const Device& device, const Backend& backend) {
-    INFO(c.name);
+    INFO(name);
     auto compositor = take(Compositor::create(device, from.description_));
     require(compositor->upload(from.views_, 0));
     require(compositor->upload(to.views_, 1));
@@ -95,13 +99,19 @@ void check_case(const Case& c) {
         FusedLight& fused = *take(compositor->fuse(from.light_, frames));
         const std::vector<std::uint8_t> picture = stage.draw(fused);
         const int step = largest_step(picture, expected);
-        std::printf("fused %-32s %-9s half %.1f blend %.1f: at most %d level(s) apart\n", c.name,
+        std::printf("fused %-32s %-9s half %.1f blend %.1f: at most %d level(s) apart\n", name,
                     backend.name, static_cast<double>(half), static_cast<double>(frames.blend),
                     step);
         CHECK(step <= kOneLevel);
       }
     }
   });
+}
+
+void check_case(const Case& c) {
+  Case other = c;
+  other.seed = 1;
+  check_scenes(c.name, tame_scene(c), tame_scene(other));
 }
 
 }  // namespace
@@ -113,8 +123,21 @@ TEST_CASE("a fused light is drawn as the light map is", "[gles][es2]") {
   check_case({"10 bit, exponent per texel", 33, 17, 3, 10, false, 0});
 }
 
+TEST_CASE("a fused prediction is drawn as the light map is", "[gles][es2]") {
+  for (const int bits : {8, 10}) {
+    PredictedScene from({"", 32, 24, 5, 10}, {"", 32, 24, 1, bits});
+    PredictedScene to({"", 32, 24, 5, 10, false, -1, true, 1}, {"", 32, 24, 1, bits});
+    tame(from);
+    tame(to);
+    check_scenes(bits == 8 ? "predicted, s of 8 bits" : "predicted, s of 10 bits", from, to);
+  }
+  PredictedScene scene({"", 20, 28, 4, 8, true, 3}, {"", 20, 28, 1, 10, false, 4});
+  tame(scene);
+  check_scenes("predicted, exponents", scene, scene);
+}
+
 TEST_CASE("a fused light with another light needs no new program", "[gles][es2]") {
-  const Scene scene = tame({"relit", 24, 24, 4, 8, false, 0});
+  const Scene scene = tame_scene({"relit", 24, 24, 4, 8, false, 0});
   on_each_backend([&](const Device& device, const Backend&) {
     if (device.profile() == Profile::kEs2Mediump) return;
     auto compositor = take(Compositor::create(device, scene.description_));

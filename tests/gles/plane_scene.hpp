@@ -159,6 +159,19 @@ class Scene {
   std::ptrdiff_t exponent_stride_ = 0;
 };
 
+/// What the player counts on, relative to the peak.
+inline double required(const gles::Device& device) {
+  switch (device.profile()) {
+    case gles::Profile::kEs3:
+      return 1.5e-3;
+    case gles::Profile::kEs2:
+      return 4e-3;
+    case gles::Profile::kEs2Mediump:
+      break;
+  }
+  return 2e-2;
+}
+
 inline double largest_difference(std::span<const float> values,
                                  const std::vector<double>& reference) {
   double worst = 0;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <deque>
+#include <glm/gtc/matrix_transform.hpp>
 #include <random>
 
 #include "gles/picture.hpp"
@@ -101,13 +102,39 @@ decoders::Light test_light(double turn = 0) {
   return light;
 }
 
+/// A quad of one joint over three quarters of the map, its corners' normals apart.
+decoders::Mesh bent_sheet() {
+  decoders::Mesh mesh;
+  const glm::vec2 corners[] = {{0.1f, 0.1f}, {0.85f, 0.1f}, {0.85f, 0.9f}, {0.1f, 0.9f}};
+  const glm::vec3 normals[] = {
+      {0.6f, 0, 0.8f}, {-0.6f, 0, 0.8f}, {0, 0.8f, 0.6f}, {0, -0.6f, 0.8f}};
+  for (std::size_t i = 0; i < 4; ++i) {
+    mesh.positions.emplace_back(corners[i], 0.0f);
+    mesh.normals.push_back(normals[i]);
+    mesh.lightmap_uv.push_back(corners[i]);
+    mesh.joints.insert(mesh.joints.end(), {0, 0, 0, 0});
+    mesh.weights.insert(mesh.weights.end(), {1, 0, 0, 0});
+  }
+  mesh.influences_per_vertex = 4;
+  mesh.indices = {0, 1, 2, 0, 2, 3};
+  return mesh;
+}
+
+decoders::Pose turned_pose(float angle_rad) {
+  decoders::Pose pose;
+  pose.palette.push_back(
+      glm::mat4x3(glm::rotate(glm::mat4(1), angle_rad, glm::vec3(0.48f, 0.6f, 0.64f))));
+  return pose;
+}
+
 /// The light map in double precision, [3][H][W].
 struct Reference {
   std::vector<double> values;
   std::vector<double> magnitude;
   double peak = 0;
 };
-Reference reference(const Clip& clip, const FrameView& frame, const decoders::Light& light) {
+Reference reference(const Clip& clip, const FrameView& frame, const decoders::Light& light,
+                    std::span<const glm::vec3> normals = {}) {
   decoders::FoldedWeights folded;
   require(decoders::fold_light(clip.model_, clip.layers_, light, folded));
   decoders::CompositeJob job;
@@ -115,6 +142,7 @@ Reference reference(const Clip& clip, const FrameView& frame, const decoders::Li
   job.light = folded.view;
   job.light.weights = folded.weights;
   job.width = clip.model_.width, job.height = clip.model_.height;
+  job.predictions[0] = {clip.model_.prediction_plane, normals, 1};
   const reference::Composite composite = reference::composite(job);
   Reference out;
   for (std::size_t i = 0; i < composite.value.size(); ++i) {
@@ -145,10 +173,13 @@ double worst_of(Relighter& relighter, const std::vector<double>& expected) {
 
 /// On the CPU without a device, and by every path of every backend.
 void on_each_path(const Clip& clip,
-                  const std::function<void(Relighter&, const gles::Device*)>& body) {
+                  const std::function<void(Relighter&, const gles::Device*)>& body,
+                  std::span<const decoders::Mesh> meshes = {}) {
   const auto run = [&](const gles::Device* device, CompositePath path) {
     INFO("path " << composite_path_name(path));
-    auto relighter = Relighter::create(clip.model_, clip.layers_, {device, path});
+    RelightOptions options{device, path};
+    options.meshes = meshes;
+    auto relighter = Relighter::create(clip.model_, clip.layers_, options);
     if (path == CompositePath::kFused && !relighter &&
         relighter.error().code == ErrorCode::kUnsupported)
       return;  // mediump
@@ -189,6 +220,71 @@ TEST_CASE("every path gives the light map of the definition, blended or not") {
     const FrameView other(0, std::vector<PlaneView>(2));
     CHECK_FALSE(relighter.composite({&other}));
   });
+}
+
+TEST_CASE("every path predicts from the normals of the frames' own poses, blended or not") {
+  Clip clip;
+  clip.model_.prediction_plane = 0;  // which has a weight of its own besides
+  const std::vector<decoders::Mesh> meshes{bent_sheet()};
+  const decoders::Pose poses[2] = {turned_pose(0.3f), turned_pose(1.4f)};
+  auto texels = take(decoders::TexelNormals::create(meshes, kWidth, kHeight));
+  std::vector<glm::vec3> normals[2];
+  for (int i = 0; i < 2; ++i) {
+    normals[i].resize(kWidth * kHeight);
+    texels.compute(poses[i], normals[i]);
+  }
+  const FrameView a = clip.frame(0, 1), b = clip.frame(1, 2);
+  const Reference first = reference(clip, a, test_light(), normals[0]);
+  const Reference second = reference(clip, b, test_light(), normals[1]);
+  CHECK_FALSE(Relighter::create(clip.model_, clip.layers_, {}));  // no meshes
+  on_each_path(
+      clip,
+      [&](Relighter& relighter, const gles::Device* device) {
+        require(relighter.set_light(test_light()));
+        CHECK_FALSE(relighter.composite({&a}));  // no pose
+        CHECK_FALSE(relighter.composite({&a, &b, 0.5f, &poses[0], nullptr}));
+        const double allowed =
+            tolerance(device, relighter.path()) * std::max(first.peak, second.peak);
+        for (const float blend : {0.0f, 0.25f, 0.8f, 1.0f}) {
+          require(relighter.composite({&a, &b, blend, &poses[0], &poses[1]}));
+          std::vector<double> expected;
+          for (std::size_t i = 0; i < first.values.size(); ++i)
+            expected.push_back(
+                std::lerp(first.values[i], second.values[i], static_cast<double>(blend)));
+          CHECK(worst_of(relighter, expected) <= allowed);
+        }
+        CHECK(relighter.stats().uploads == (relighter.path() == CompositePath::kCpu ? 0 : 2));
+        // Without its plane there is no prediction, and no pose is asked for.
+        relighter.set_quality({0, false});
+        require(relighter.composite({&a}));
+      },
+      meshes);
+}
+
+TEST_CASE("a light map of half the size predicts as its texels do at full size") {
+  Clip clip;
+  clip.model_.prediction_plane = 0;
+  const std::vector<decoders::Mesh> meshes{bent_sheet()};
+  const decoders::Pose pose = turned_pose(0.7f);
+  auto texels = take(decoders::TexelNormals::create(meshes, kWidth, kHeight));
+  std::vector<glm::vec3> normals(kWidth * kHeight);
+  texels.compute(pose, normals);
+  const FrameView a = clip.frame(0, 1);
+  const Reference full = reference(clip, a, test_light(), normals);
+  on_each_path(
+      clip,
+      [&](Relighter& relighter, const gles::Device* device) {
+        require(relighter.set_light(test_light()));
+        relighter.set_quality({-1, true});
+        require(relighter.composite({&a, nullptr, 0, &pose}));
+        std::vector<double> expected;
+        for (std::size_t c = 0; c < 3; ++c)
+          for (std::size_t y = 0; y < kHeight; y += 2)
+            for (std::size_t x = 0; x < kWidth; x += 2)
+              expected.push_back(full.values[(c * kHeight + y) * kWidth + x]);
+        CHECK(worst_of(relighter, expected) <= tolerance(device, relighter.path()) * full.peak);
+      },
+      meshes);
 }
 
 TEST_CASE("each frame is uploaded once while time moves on") {

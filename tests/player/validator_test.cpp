@@ -194,7 +194,8 @@ TEST_CASE("validator finds fields that break rules, exceed limits or are of late
        [](Pieces& p) { edit<ModelRecord>(p, "MODL", parse_model, [](auto& r) { r.order = 4; }); }},
       {"MODL_UNSUPPORTED",
        [](Pieces& p) {
-         edit<ModelRecord>(p, "MODL", parse_model, [](auto& r) { r.prediction_plane = 0; });
+         edit<ModelRecord>(p, "MODL", parse_model,
+                           [](auto& r) { r.kind = container::ModelKind{1}; });
        }},
       {"LAYR_CORRUPT",
        [](Pieces& p) { edit<Layer>(p, "LAYR", parse_layer, [](auto& r) { r.bit_depth = 9; }); }},

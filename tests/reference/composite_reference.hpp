@@ -41,13 +41,16 @@ inline Composite composite(const decoders::CompositeJob& job) {
           magnitude += term_magnitude;
         };
         for (std::size_t k = 0; k < job.planes.size(); ++k) {
-          const bool predicts = static_cast<int>(k) == job.light.prediction_plane;
+          const decoders::CompositePrediction* predicts = nullptr;
+          for (const decoders::CompositePrediction& each : job.predictions)
+            if (each.plane == static_cast<int>(k)) predicts = &each;
           const auto weight = static_cast<double>(job.light.weights[k][c]);
-          if (job.planes[k].mantissa.empty() || (weight == 0 && !predicts)) continue;
+          if (job.planes[k].mantissa.empty() || (weight == 0 && predicts == nullptr)) continue;
           const double value = plane_value(job.planes[k], x, y);
           add(weight * value, std::abs(weight * value));
-          if (!predicts) continue;
-          const glm::dvec3 normal(job.normals[texel]);
+          if (predicts == nullptr) continue;
+          const double s = value * static_cast<double>(predicts->share);
+          const glm::dvec3 normal(predicts->normals[texel]);
           std::array<double, 16> harmonics{};
           decoders::evaluate_sh(3, normal, harmonics);
           // |3z² − 1| is the difference of two terms, each of which rounds: bound it by their sum.
@@ -57,7 +60,7 @@ inline Composite composite(const decoders::CompositeJob& job) {
           largest[8] = 0.54627421529604 * (normal.x * normal.x + normal.y * normal.y);
           for (std::size_t n = 0; n < 16; ++n) {
             const auto irradiance = static_cast<double>(job.light.irradiance[n][c]);
-            add(value * irradiance * harmonics[n], std::abs(value * irradiance * largest[n]));
+            add(s * irradiance * harmonics[n], std::abs(s * irradiance * largest[n]));
           }
         }
         result.value[c * texels + texel] = sum;
@@ -74,8 +77,8 @@ inline Composite composite(const decoders::CompositeJob& job) {
 /// most 14 times inside E(N) (folded factor, polynomial 3, product, 8 additions, product with s).
 /// First order and 1 % for the rest. Results near zero are multiples of 2^-149.
 inline double composite_bound(const decoders::CompositeJob& job, double magnitude) {
-  const bool predicted = job.light.prediction_plane >= 0;
-  const double roundings = static_cast<double>(job.planes.size()) + 2 + (predicted ? 15 : 0);
+  const bool predicted = job.predictions[0].plane >= 0 || job.predictions[1].plane >= 0;
+  const double roundings = static_cast<double>(job.planes.size()) + 2 + (predicted ? 16 : 0);
   return 1.01 * roundings * std::ldexp(magnitude, -24) +
          std::ldexp(static_cast<double>(job.planes.size()) + 2, -149);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "bake_minimal/texel_raster.hpp"
+#include "decoders/texel_raster.hpp"
 
 #include <cmath>
 #include <limits>
@@ -7,10 +7,9 @@
 #include <random>
 #include <vector>
 
-#include "bake_minimal/atlas.hpp"
 #include "tests/test.hpp"
 
-using namespace relit::bake;
+using namespace relit::decoders;
 
 namespace {
 
@@ -18,6 +17,13 @@ struct Mesh2 {
   std::vector<glm::vec2> uv;
   std::vector<std::uint32_t> indices;
 };
+
+std::vector<TexelSample> rasterized(std::span<const glm::vec2> uv,
+                                    std::span<const std::uint32_t> indices, int width, int height) {
+  auto samples = rasterize_atlas(uv, indices, width, height);
+  REQUIRE(samples);
+  return std::move(*samples);
+}
 
 // A grid of n × n quads over [lo,hi]² with inner vertices moved at random, diagonals at random.
 Mesh2 jittered_grid(int n, float lo, float hi, unsigned seed, bool mirrored) {
@@ -52,7 +58,7 @@ std::vector<int> owners_per_texel(const Mesh2& m, int width, int height) {
   std::vector<int> count(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
   for (std::size_t t = 0; t + 2 < m.indices.size(); t += 3) {
     FixedTriangle(m.uv[m.indices[t]], m.uv[m.indices[t + 1]], m.uv[m.indices[t + 2]], width, height)
-        .for_each_row(width, height, [&](int y, int x0, int x1) {
+        .for_each_row(0, height, width, [&](int y, int x0, int x1) {
           for (int x = x0; x <= x1; ++x) ++count[static_cast<std::size_t>(y * width + x)];
         });
   }
@@ -98,7 +104,7 @@ TEST_CASE("barycentric coordinates lead back to the texel centre") {
   const int width = 61, height = 40;
   for (const bool mirrored : {false, true}) {
     const Mesh2 m = jittered_grid(5, 0.1f, 0.9f, 3, mirrored);
-    const auto samples = rasterize_atlas(m.uv, m.indices, width, height);
+    const auto samples = rasterized(m.uv, m.indices, width, height);
     std::uint32_t before = 0;
     bool first = true;
     for (const TexelSample& s : samples) {
@@ -128,7 +134,7 @@ TEST_CASE("barycentric coordinates lead back to the texel centre") {
 TEST_CASE("texels whose square touches a chart take its nearest point over all triangles") {
   const int size = 32;
   const Mesh2 m = jittered_grid(3, 0.21f, 0.77f, 9, false);
-  const auto samples = rasterize_atlas(m.uv, m.indices, size, size);
+  const auto samples = rasterized(m.uv, m.indices, size, size);
   std::map<std::uint32_t, TexelSample> by_texel;
   for (const TexelSample& s : samples) by_texel[s.texel] = s;
   const float lo = 0.21f * size, hi = 0.77f * size;
@@ -157,7 +163,7 @@ TEST_CASE("texels whose square touches a chart take its nearest point over all t
 TEST_CASE("a triangle on texel borders touches the texels next to them") {
   const std::vector<glm::vec2> uv{{0.25f, 0.25f}, {0.75f, 0.25f}, {0.75f, 0.75f}, {0.25f, 0.75f}};
   const std::vector<std::uint32_t> indices{0, 1, 2, 0, 2, 3};
-  const auto samples = rasterize_atlas(uv, indices, 8, 8);
+  const auto samples = rasterized(uv, indices, 8, 8);
   // 4 × 4 inside, and the ring of closed squares that share a side or a corner with it.
   CHECK(samples.size() == 36);
   int covered = 0;
@@ -171,13 +177,13 @@ TEST_CASE("degenerate, unfinished and far triangles own nothing") {
   const std::vector<glm::vec2> uv{{0.1f, 0.1f}, {0.5f, 0.5f}, {0.9f, 0.9f},
                                   {nan, 0.2f},  {inf, 0.1f},  {1e30f, 0.3f}};
   const std::vector<std::uint32_t> indices{0, 1, 2, 0, 0, 1, 0, 1, 3, 0, 1, 4, 0, 2, 5};
-  CHECK(rasterize_atlas(uv, indices, 64, 64).empty());
+  CHECK(rasterized(uv, indices, 64, 64).empty());
 }
 
 TEST_CASE("triangles beyond the atlas are clipped to it") {
   const std::vector<glm::vec2> uv{{-3, -3}, {7, -3}, {-3, 7}};
   const std::vector<std::uint32_t> indices{0, 1, 2};
-  const auto samples = rasterize_atlas(uv, indices, 16, 9);
+  const auto samples = rasterized(uv, indices, 16, 9);
   CHECK(samples.size() == 16 * 9);
   for (const TexelSample& s : samples) REQUIRE(s.covered);
 }
@@ -185,7 +191,7 @@ TEST_CASE("triangles beyond the atlas are clipped to it") {
 TEST_CASE("where triangles overlap the first one owns the texel") {
   const std::vector<glm::vec2> uv{{0, 0}, {1, 0}, {0, 1}, {1, 1}};
   const std::vector<std::uint32_t> indices{0, 1, 2, 2, 1, 0, 0, 1, 3};
-  for (const TexelSample& s : rasterize_atlas(uv, indices, 16, 16)) {
+  for (const TexelSample& s : rasterized(uv, indices, 16, 16)) {
     if (s.covered) REQUIRE(s.triangle != 1);
   }
 }
