@@ -23,6 +23,14 @@ constexpr int kMostUnits = 8;
 
 int unit_of(int sheet) { return sheet; }
 
+// llvmpipe gathers each number of a uniform again for every eight pixels, which takes as long as a
+// third of a texel's lookup. On a GPU uniforms cost nothing, and inputs do.
+int flat_vectors(const Device& device) {
+  const Capabilities& caps = device.caps();
+  const bool worth = caps.renderer.find("llvmpipe") != std::string::npos;
+  return device.profile() == Profile::kEs3 && worth ? caps.max_varying_vectors - 1 : 0;
+}
+
 double value_at(const PlaneView& plane, int x, int y) {
   const double mantissa = plane.mantissa.at(x >> plane.mantissa_shift, y >> plane.mantissa_shift);
   int exponent = plane.exponent_zero;
@@ -106,8 +114,11 @@ Result<Compositor::Shader> Compositor::build_shader(const Pass& pass,
     sum += text.varyings + text.uniforms + "void main() {\n  vec3 sum = u_constant;\n" +
            text.statements;
   } else {
-    vertex_text = shaders::composite_vert;
-    sum += pass.planes.text(PlaneTaps::kOne, counts, sheets_) +
+    FlatWeights flat(flat_vectors(device_));
+    const std::string planes = pass.planes.text(PlaneTaps::kOne, counts, sheets_, &flat);
+    vertex_text = pass.planes.weight_declarations(counts) + flat.outputs() +
+                  std::string(shaders::composite_vert);
+    sum += flat.inputs() + planes +
            "VARYING vec2 v_texel;\nvoid main() {\n  tap_at = v_texel;\n  vec3 sum = plane_sum();\n";
   }
   const std::string_view vertex[] = {vertex_text};

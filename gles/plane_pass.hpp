@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "container/base/plane_view.hpp"
+#include "gles/flat_weights.hpp"
 #include "gles/plane_sheets.hpp"
 
 namespace relit::gles {
@@ -55,9 +56,12 @@ class PlanePass {
                                      const PlaneSheets& sheets, const Limits& limits);
 
   /// For a shader's head: samplers u_sheet0 …, weights, and the function `vec3 plane_sum()` of the
-  /// groups that `counts` says.
+  /// groups that `counts` says. With `flat`, weights are taken from there, whose inputs have to be
+  /// declared before.
   [[nodiscard]] std::string text(PlaneTaps taps, std::span<const int> counts,
-                                 const PlaneSheets& sheets) const;
+                                 const PlaneSheets& sheets, FlatWeights* flat = nullptr) const;
+  /// The weights' declarations alone, for the vertex shader that `flat` copies them in.
+  [[nodiscard]] std::string weight_declarations(std::span<const int> counts) const;
 
   /// The same with lookups as varyings, which the vertex shader assigns, and of all groups.
   struct LookupText {
@@ -140,6 +144,7 @@ class PlanePass {
   static std::string place_text(const Group& group, const Batch& batch, int lookup,
                                 const PlaneSheets& sheets);
   static std::size_t plane_of(const Group& group, int slot);
+  [[nodiscard]] std::string weight_names(std::size_t index, int group, FlatWeights* flat) const;
   [[nodiscard]] bool is_raw(const Batch& batch) const {
     return batch.exponent_sheet < 0 && !lookups_ && !batch.predicts;
   }

@@ -26,6 +26,8 @@ std::string channel_names(unsigned channels) {
   return names.empty() ? "r" : names;
 }
 
+constexpr const char* kWeightNames[] = {"WEIGHT_0", "WEIGHT_1", "WEIGHT_2", "REFERENCE"};
+
 std::string weights_name(std::size_t batch) { return "u_weight" + std::to_string(batch); }
 
 // Ten digits tell any two floats apart.
@@ -77,8 +79,39 @@ std::string PlanePass::place_text(const Group& group, const Batch& batch, int lo
   return vector_of(sheets.coordinates(exponent ? sheets.exponent(k) : sheets.mantissa(k)));
 }
 
-std::string PlanePass::text(PlaneTaps taps, std::span<const int> counts,
-                            const PlaneSheets& sheets) const {
+// What a group's statements call its weights, each of its plane's channels, and E_ref, which is the
+// fourth number of the first weight.
+std::string PlanePass::weight_names(std::size_t index, int group, FlatWeights* flat) const {
+  const Batch& batch = batches_[index];
+  const auto number = [&](int slot, char channel) {
+    const std::string uniform = weights_name(index) + "[" +
+                                std::to_string(group * batch.planes_per_group + slot) + "]." +
+                                channel;
+    return flat != nullptr ? flat->name(uniform) : uniform;
+  };
+  std::string text;
+  for (int i = 0; i < batch.planes_per_group; ++i) {
+    const auto slot = static_cast<std::size_t>(i);
+    const std::string channels =
+        channel_names(batch.groups[static_cast<std::size_t>(group)].channels[slot]);
+    std::string weight;
+    for (const char channel : channels) weight += (weight.empty() ? "" : ", ") + number(i, channel);
+    if (channels.size() > 1) weight = "vec" + std::to_string(channels.size()) + "(" + weight + ")";
+    text += define(kWeightNames[slot], weight);
+  }
+  if (batch.exponent_sheet >= 0) text += define("REFERENCE", number(0, 'a'));
+  return text;
+}
+
+std::string PlanePass::weight_declarations(std::span<const int> counts) const {
+  std::string text;
+  for (std::size_t b = 0; b < batches_.size(); ++b)
+    if (counts[b] > 0) text += weights_text(b, counts[b]);
+  return text;
+}
+
+std::string PlanePass::text(PlaneTaps taps, std::span<const int> counts, const PlaneSheets& sheets,
+                            FlatWeights* flat) const {
   std::string text = samplers();
   if (taps == PlaneTaps::kFour) text += define("FOUR_TAPS", "1");
   text += shaders::composite_taps;
@@ -91,6 +124,8 @@ std::string PlanePass::text(PlaneTaps taps, std::span<const int> counts,
     text += "vec3 " + name + " {\n  vec3 sum = vec3(0.0);\n  vec2 low, high;\n";
     for (int g = 0; g < counts[b]; ++g) {
       std::string names = define("GROUP", std::to_string(g)), after = undefine("GROUP");
+      if (!batch.predicts) names += weight_names(b, g, flat);
+      for (const char* each : kWeightNames) after += undefine(each);
       for (int i = 0; i < batch.lookups(); ++i) {
         const std::string place =
             i == batch.planes_per_group ? "PLACE_E" : "PLACE_" + std::to_string(i);

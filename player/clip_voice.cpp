@@ -27,10 +27,14 @@ Status ClipVoice::attach(RelightOptions options) {
 }
 
 ClipVoice::Frames ClipVoice::go_to(const FramePosition& position, bool interpolate) {
-  prefetcher_->want(position.frame);
   Frames frames;
-  frames.from = prefetcher_->frame(position.frame);
-  frames.late = frames.from == nullptr || !position.known;
+  if (position.known) {
+    prefetcher_->want(position.frame);
+    frames.from = prefetcher_->frame(position.frame);
+  } else {
+    prefetcher_->want_tick(position.tick);
+  }
+  frames.late = frames.from == nullptr;
   if (frames.from == nullptr) frames.from = prefetcher_->shown();
   if (!frames.late && interpolate && position.fraction > 0 &&
       position.next_frame != position.frame) {

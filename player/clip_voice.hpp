@@ -40,7 +40,8 @@ class ClipVoice {
     }
     bool operator==(const Frames&) const = default;
   };
-  /// Goes to a position; never waits. The frames are valid until the next call.
+  /// Goes to a position, or looks for the frame that is shown there; never waits. The frames are
+  /// valid until the next call.
   Frames go_to(const FramePosition& position, bool interpolate);
 
   /// Folds a light, and fetches from then on what it needs besides what is fetched already. Errors:

@@ -91,7 +91,8 @@ Result<std::optional<MemoryPlan>> plan_within(const Arguments& arguments,
 /// How long after their time frames were there to be shown, composited if that was asked for.
 class Lateness {
  public:
-  explicit Lateness(std::size_t frames) { ms_.reserve(frames); }
+  /// Room that is taken at once, so that it is not while frames are due.
+  void expect(std::size_t frames) { ms_.reserve(frames); }
   void add(Clock::duration late) {
     ms_.push_back(std::chrono::duration<float, std::milli>(late).count());
   }
@@ -119,7 +120,9 @@ class Stream {
   [[nodiscard]] PlaybackLoss loss() const { return clip_->loss(); }
 
  private:
-  explicit Stream(const Arguments& arguments) : arguments_(arguments) {}
+  explicit Stream(const Arguments& arguments) : arguments_(arguments) {
+    if (arguments.realtime) lateness_.expect(1 << 16);
+  }
   Status show(std::uint64_t index);
   Status fill_ring(std::uint64_t index);
   Status show_in_time(std::uint64_t index, Clock::time_point due, Clock::duration lasts);
@@ -135,7 +138,7 @@ class Stream {
   std::unique_ptr<Prefetcher> clip_;
   std::unique_ptr<Relighter> relighter_;  ///< composites on the CPU, as a player without a GPU
   BufferLevels levels_;
-  Lateness lateness_{1 << 16};
+  Lateness lateness_;
   double progress_s_ = 0;
   double open_s_ = 0, first_s_ = 0, play_s_ = 0;
   std::uint64_t frames_ = 0, late_ = 0, dropped_ = 0;

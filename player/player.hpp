@@ -191,7 +191,7 @@ class Player {
   /// `timeout_s`. Errors: as update(), and those of Prefetcher::wait().
   Result<bool> wait(double timeout_s);
   /// Goes to a frame of the clip that plays and waits for it, wherever it is; one that damage hit
-  /// shows the last good one. As wait().
+  /// keeps what is shown. As wait().
   Result<bool> show_frame(std::uint64_t frame, double timeout_s);
   /// How many ticks a frame that has been shown lasts.
   [[nodiscard]] std::uint32_t ticks_of(std::uint64_t frame) const;

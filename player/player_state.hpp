@@ -80,6 +80,8 @@ struct Player::State final : FrameTimes {
   [[nodiscard]] bool stands(std::int64_t now_ns);
   Result<bool> wait(double timeout_s);
   Result<bool> show_frame(std::uint64_t frame, double timeout_s);
+  static Result<bool> wait_for_place(ClipVoice& voice, const FramePosition& position,
+                                     double timeout_s);
   Result<bool> wait_for(ClipVoice& voice, const FramePosition& position, double timeout_s);
   Status source_error();
 

@@ -37,12 +37,7 @@ Status Player::State::update(std::int64_t now_ns) {
   // The picture that was waited for has been drawn.
   if (moment.ready && !seeking) primary->prefetcher().fetch_ahead();
   if (stand) playback->skip_to(now_ns);
-  Moment now = stand ? playback->now() : playback->at(now_ns);
-  // After a seek into frames of unequal length somebody has to look where they are.
-  if (seeking && !now.primary.known && primary && primary->clip() == now.primary.clip) {
-    RELIT_TRY(primary->prefetcher().frame_at(now.primary.tick));
-    now = playback->now();
-  }
+  const Moment now = stand ? playback->now() : playback->at(now_ns);
   const Status shown =
       catch_out_of_memory("showing a frame", [&] { return show(now, seeking || !moment.ready); });
   update_s += seconds_since(begin);
@@ -223,6 +218,14 @@ Status Player::State::source_error() {
   return error;
 }
 
+// Until it is known which frame a position shows.
+Result<bool> Player::State::wait_for_place(ClipVoice& voice, const FramePosition& position,
+                                           double timeout_s) {
+  if (position.known) return true;
+  voice.prefetcher().want_tick(position.tick);
+  return voice.prefetcher().wait_tick(position.tick, timeout_s);
+}
+
 // Until all planes of a position are here, the early first picture's too.
 Result<bool> Player::State::wait_for(ClipVoice& voice, const FramePosition& position,
                                      double timeout_s) {
@@ -245,21 +248,24 @@ Result<bool> Player::State::wait_for(ClipVoice& voice, const FramePosition& posi
 
 Result<bool> Player::State::wait(double timeout_s) {
   const Clock::time_point begin = Clock::now();
+  const auto left = [&] { return std::max(0.0, timeout_s - seconds_since(begin)); };
   if (cancelled.load()) return fail(ErrorCode::kCancelled, options.name + ": cancelled");
   Moment now = playback->now();
   RELIT_TRY(assign_voices(now));
-  if (!now.primary.known) {
-    RELIT_TRY(primary->prefetcher().frame_at(now.primary.tick));
-    now = playback->now();
-  }
   // The light may need layers that are fetched anew.
   bool anew = false;
   RELIT_TRY(bring_light(anew));
   recomposite |= anew;
-  RELIT_ASSIGN(bool here, wait_for(*primary, now.primary, timeout_s));
+  RELIT_ASSIGN(bool here, wait_for_place(*primary, now.primary, left()));
   if (here && now.secondary) {
-    RELIT_ASSIGN(here, wait_for(*secondary, *now.secondary,
-                                std::max(0.0, timeout_s - seconds_since(begin))));
+    RELIT_ASSIGN(here, wait_for_place(*secondary, *now.secondary, left()));
+  }
+  now = playback->now();
+  if (here) {
+    RELIT_ASSIGN(here, wait_for(*primary, now.primary, left()));
+  }
+  if (here && now.secondary) {
+    RELIT_ASSIGN(here, wait_for(*secondary, *now.secondary, left()));
   }
   RELIT_TRY(catch_out_of_memory("showing a frame", [&] { return show(now, true); }));
   return here && !moment.late;

@@ -67,15 +67,16 @@ void State::fail_with(Error failure) {
 void State::go_to_start(std::unique_lock<std::mutex>& lock) {
   const std::uint64_t mine = epoch, index = start;
   const std::optional<std::uint64_t> tick = start_tick;
-  const bool at_beginning = demux_epoch == 0 && demuxer.complete_end() == 0 && !tick;
+  const bool at_beginning =
+      demux_epoch == 0 && demuxer.complete_end() == 0 && index == 0 && tick.value_or(0) == 0;
   if (demuxer.interrupt() && !closing && !cancelled) demuxer.interrupt()->clear();
   for (const auto& track : tracks) {
     for (const auto& lane : track->lanes) drop_chunks(*lane, last_no + 1);
   }
   lock.unlock();
-  Result<bool> jumped = tick                         ? demuxer.jump_to_tick(*tick)
-                        : at_beginning && index == 0 ? Result<bool>(false)
-                                                     : demuxer.jump(index);
+  Result<bool> jumped = at_beginning ? Result<bool>(false)
+                        : tick       ? demuxer.jump_to_tick(*tick)
+                                     : demuxer.jump(index);
   lock.lock();
   if (closing || epoch != mine) return;
   demux_epoch = mine;
@@ -89,6 +90,8 @@ void State::go_to_start(std::unique_lock<std::mutex>& lock) {
   if (jumped && !*jumped) demuxer.skip_segment();
   come_end = tick ? 0 : demuxer.complete_end();
   near_end = come_end;
+  come_ticks = 0;
+  near_end_tick = !tick && index == 0 ? 1 : 0;
   next_index = tick ? std::nullopt : std::optional(index);
   if (!jumped) return fail_with(jumped.error());
   if (!tick && !*jumped && index < come_end) return fail_with(demuxer.gone_by(index).error);
@@ -177,6 +180,9 @@ void State::take_segment() {
   const std::uint64_t end = segment->first_frame + segment->frame_count;
   segments.push_back({++last_no, demux_lap, segment->first_frame, end, wanted});
   near_end = end + segment->frame_count;
+  come_ticks = segment->first_tick;
+  const auto last = player::span_of_frame(timeline, end - 1);
+  if (last) near_end_tick = 2 * (last->first_tick + last->ticks) - come_ticks;
 }
 
 /// The segment of the tick tells which frame playback starts with.

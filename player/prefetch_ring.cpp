@@ -134,28 +134,19 @@ void State::detach(std::uint64_t seq) {
     next.charged = std::exchange(slot.parts[t].charged, 0);
     next.shares_previous = false;
   }
-  if (&slot == shown) {
+  if (&slot == shown)
     shown_detached = true;
-    return;
-  }
-  if (!slot.good()) {
+  else
     free_slot(&slot);
-    return;
-  }
-  if (fallback != nullptr) free_slot(fallback);
-  fallback = &slot;
 }
 
 void State::release_before(std::uint64_t seq) {
   while (head < seq) detach(head++);
-  const bool needed = head == tail || !at(head).good();
-  if (!needed && fallback != nullptr) free_slot(std::exchange(fallback, nullptr));
 }
 
 /// Everything that was fetched goes; what is shown stays.
 void State::restart(std::uint64_t index, std::optional<std::uint64_t> tick) {
   release_before(tail);
-  if (fallback != nullptr) free_slot(std::exchange(fallback, nullptr));
   ++epoch;
   ++counts.restarts;
   start = index;
@@ -173,6 +164,17 @@ bool State::is_near(std::uint64_t index) const {
   if (demux_epoch != epoch) return false;
   if (!next_index || index < *next_index) return false;
   return index < near_end || demux_lap > admit_lap || !demuxer.seekable();
+}
+
+/// Whether going on comes soon to the segment of a tick that is not known yet.
+bool State::comes_to(std::uint64_t tick) const {
+  if (error || ended || demux_lap != admit_lap) return false;
+  // Of a tick that is looked for already: playback has gone on meanwhile.
+  const auto& rate = demuxer.clip().tick_rate;
+  const auto second = static_cast<std::uint64_t>(rate.num / std::max<std::int64_t>(rate.den, 1));
+  if (start_tick) return tick > *start_tick && tick - *start_tick <= second;
+  if (demux_epoch != epoch) return tick == 0 && start == 0;
+  return tick >= come_ticks && (tick < near_end_tick || !demuxer.seekable());
 }
 
 bool State::ready(const Slot& slot) const {
@@ -215,13 +217,15 @@ void State::assemble(Slot& slot) {
     }
     first_plane += layers[i].planes.size();
   }
-  frame.complete = slot.missing == 0;
+  // What has left the ring will not become any more complete.
+  frame.complete = slot.missing == 0 || (&slot == shown && shown_detached);
 }
 
-/// What is shown for a frame that damage hit: the last good one before it.
+/// What is shown for a frame that damage hit: what is shown anyway. Before that there is the last
+/// good one before it.
 State::Slot* State::stand_in(Slot& slot) {
-  Slot* best = fallback != nullptr ? fallback : shown;
-  for (std::uint64_t seq = head; seq < tail && &at(seq) != &slot; ++seq) {
+  Slot* best = shown;
+  for (std::uint64_t seq = head; shown == nullptr && seq < tail && &at(seq) != &slot; ++seq) {
     if (at(seq).good()) best = &at(seq);
   }
   return best;

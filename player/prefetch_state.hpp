@@ -99,6 +99,7 @@ struct Prefetcher::State {
 
   explicit State(ClipDemuxer d) : demuxer(std::move(d)), timeline(demuxer.timeline()) {}
   ~State();
+  [[nodiscard]] static Clock::time_point after(double timeout_s);
 
   // prefetch_ring.cpp
   [[nodiscard]] Slot& at(std::uint64_t seq) { return *ring[seq % ring.size()]; }
@@ -113,6 +114,7 @@ struct Prefetcher::State {
   void release_before(std::uint64_t seq);
   void restart(std::uint64_t index, std::optional<std::uint64_t> tick);
   [[nodiscard]] bool is_near(std::uint64_t index) const;
+  [[nodiscard]] bool comes_to(std::uint64_t tick) const;
   [[nodiscard]] bool ready(const Slot& slot) const;
   void assemble(Slot& slot);
   Slot* stand_in(Slot& slot);
@@ -170,7 +172,7 @@ struct Prefetcher::State {
   bool closing = false, cancelled = false;
   std::uint64_t epoch = 1;  ///< jumps
   std::uint64_t start = 0;
-  std::optional<std::uint64_t> start_tick;
+  std::optional<std::uint64_t> start_tick;  ///< its segment is looked for, and nothing admitted
   std::optional<Error> error;
   bool gone_by = false;  ///< the error is only that what is wanted lies behind
 
@@ -185,7 +187,6 @@ struct Prefetcher::State {
   std::vector<Slot*> free_slots;
   Slot* shown = nullptr;        ///< given for the wanted frame last
   bool shown_detached = false;  ///< it is no longer in the ring
-  Slot* fallback = nullptr;     ///< newest good frame that has gone by
   std::uint64_t wanted_index = 0;
   bool given = false;                       ///< a picture since the start or jump
   bool eager = false;                       ///< playback has moved on from the first picture
@@ -200,8 +201,9 @@ struct Prefetcher::State {
   std::uint64_t demux_epoch = 0, demux_lap = 0, lap_start = 0;
   std::uint64_t come_end = 0;  ///< frames of this lap before this one have come
   std::uint64_t near_end = 0;  ///< end of the last segment known, and one such segment more
-  bool ended = false;          ///< of this lap
-  bool starving = false;       ///< a decoder waits for a chunk
+  std::uint64_t come_ticks = 0, near_end_tick = 0;  ///< where that segment begins; near_end's tick
+  bool ended = false;                               ///< of this lap
+  bool starving = false;                            ///< a decoder waits for a chunk
   container::Timeline timeline;
   std::vector<container::ChunkRecord> returned;  ///< for the demuxer
   std::size_t packet_bytes = 0, spare_bytes = 0;

@@ -8,6 +8,11 @@
 
 namespace relit::player {
 
+Prefetcher::State::Clock::time_point Prefetcher::State::after(double timeout_s) {
+  return Clock::now() + std::chrono::duration_cast<Clock::duration>(
+                            std::chrono::duration<double>(std::clamp(timeout_s, 0.0, 1e8)));
+}
+
 Prefetcher::State::~State() {
   {
     const std::lock_guard lock(mutex);
@@ -71,7 +76,7 @@ void Prefetcher::want(std::uint64_t index) {
     s.error.reset();
     s.work.notify_one();
   }
-  if (index == s.wanted_index && !s.error) return;
+  if (index == s.wanted_index && !s.error && !s.start_tick) return;
   s.wanted_index = index;
   s.underrun = false;
   for (std::uint64_t seq = s.head; seq < s.tail; ++seq) {
@@ -130,8 +135,7 @@ const ClipFrame* Prefetcher::frame(std::uint64_t index) {
   if (slot == s.shown) return &slot->frame;
   if (s.shown != nullptr && s.shown_detached) s.free_slot(s.shown);
   s.shown = slot;
-  s.shown_detached = slot == s.fallback;
-  if (s.shown_detached) s.fallback = nullptr;
+  s.shown_detached = false;
   return &slot->frame;
 }
 
@@ -149,10 +153,8 @@ Result<bool> Prefetcher::wait(std::uint64_t index, double timeout_s) {
     const State::Slot* slot = s.find(index);
     return slot != nullptr && s.ready(*slot);
   };
-  const auto until =
-      State::Clock::now() + std::chrono::duration_cast<State::Clock::duration>(
-                                std::chrono::duration<double>(std::clamp(timeout_s, 0.0, 1e8)));
-  s.changed.wait_until(lock, until, [&] { return s.cancelled || s.error || here(); });
+  s.changed.wait_until(lock, State::after(timeout_s),
+                       [&] { return s.cancelled || s.error || here(); });
   if (s.cancelled) return fail(ErrorCode::kCancelled, s.demuxer.name() + ": cancelled");
   if (here()) {
     State::Slot& slot = *s.find(index);
@@ -182,19 +184,31 @@ void Prefetcher::cancel() {
   s.changed.notify_all();
 }
 
-Result<std::uint64_t> Prefetcher::frame_at(std::uint64_t tick) {
+void Prefetcher::want_tick(std::uint64_t tick) {
+  State& s = *state_;
+  const std::lock_guard lock(s.mutex);
+  if (s.timeline.frame_at(tick) || s.start_tick == tick) return;
+  if (s.comes_to(tick)) {
+    s.release_before(s.tail);
+    s.next_index.reset();
+    s.start_tick = tick;
+    s.work.notify_one();
+  } else if (tick < s.demuxer.clip().duration_ticks) {
+    s.restart(0, tick);
+  }
+}
+
+Result<bool> Prefetcher::wait_tick(std::uint64_t tick, double timeout_s) {
   State& s = *state_;
   RELIT_TRY(s.demuxer.check_tick(tick));
   std::unique_lock lock(s.mutex);
-  if (const auto known = s.timeline.frame_at(tick)) return *known;
-  s.restart(0, tick);
-  s.changed.wait(lock, [&] { return s.cancelled || s.error || !s.start_tick; });
+  const auto known = [&] { return s.timeline.frame_at(tick).has_value(); };
+  s.changed.wait_until(lock, State::after(timeout_s),
+                       [&] { return s.cancelled || s.error || known(); });
   if (s.cancelled) return fail(ErrorCode::kCancelled, s.demuxer.name() + ": cancelled");
-  if (s.error && s.start_tick) {
-    s.start_tick.reset();
-    return Unexpected{*s.error};
-  }
-  return s.start;
+  if (known()) return true;
+  if (s.error) return Unexpected{*s.error};
+  return false;
 }
 
 std::optional<FrameSpan> Prefetcher::span_at_tick(std::uint64_t tick) const {

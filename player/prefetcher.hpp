@@ -108,9 +108,9 @@ class Prefetcher {
   void fetch_ahead();
 
   /// The frame, if it is decoded; null: not yet. Those from the wanted one on can be asked for.
-  /// Where damage hit it, the last good one before it, and the loss is counted when the wanted
-  /// frame is asked for. Null for the wanted frame counts as an underrun, once, unless playback
-  /// has just begun or jumped. Never blocks.
+  /// Where damage hit it, what is shown stays: shown(), or before anything was shown the last good
+  /// frame before it; the loss is counted when the wanted frame is asked for. Null for the wanted
+  /// frame counts as an underrun, once, unless playback has just begun or jumped. Never blocks.
   /// The pointer holds until want() goes past the frame, and beyond that until frame() gives a
   /// wanted frame again: what is shown stays. An incomplete picture is completed in place by a
   /// later call.
@@ -125,13 +125,17 @@ class Prefetcher {
   Result<bool> wait(std::uint64_t index, double timeout_s);
   /// The error that playback has come to, as wait() would return it for the wanted frame.
   [[nodiscard]] Status error() const;
-  /// Makes wait() and frame_at() return, now and from now on. Any thread.
+  /// Makes wait() and wait_tick() return, now and from now on. Any thread.
   void cancel();
 
-  /// The frame shown at `tick` of the clip. Where frames are unevenly spaced and the place is not
-  /// known yet, this goes there as want() does, and waits. Errors: kNotFound beyond the clip or
-  /// what can be read of it; those of wait().
-  Result<std::uint64_t> frame_at(std::uint64_t tick);
+  /// Playback is at this tick, and span_at_tick() does not know which frame that is: it is looked
+  /// for, by going on where reading soon comes to it, else by starting there. What was fetched for
+  /// another place goes, and what is shown stays. Nothing happens where the tick is known, or is
+  /// being looked for. Never blocks.
+  void want_tick(std::uint64_t tick);
+  /// Waits until the tick that want_tick() looks for is known. False: not within `timeout_s`.
+  /// Errors: kNotFound beyond the clip or what can be read of it; those of wait().
+  Result<bool> wait_tick(std::uint64_t tick, double timeout_s);
   /// What is known by now of when frames are shown; nothing: not yet. Never blocks.
   [[nodiscard]] std::optional<FrameSpan> span_at_tick(std::uint64_t tick) const;
   [[nodiscard]] std::optional<FrameSpan> span_of_frame(std::uint64_t index) const;

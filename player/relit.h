@@ -373,8 +373,10 @@ typedef struct relit_moment {
 
 /// Once a display frame: moves the clock to `now_ns`, a monotonic time of the host's choosing,
 /// takes the frames that are there, lets the governor decide, and composites if frame, light or
-/// quality changed. Does not wait for frames: one that is not here is late, and what stays late for
-/// a quarter of a second makes the clock stand until it comes. The clock starts with the first call
+/// quality changed. Does not wait for frames: one that is not here is late, as is one of unequal
+/// length of which it is not known yet when it is shown; the last picture stays, and what stays
+/// late for a quarter of a second makes the clock stand until it comes. A frame that damage hit is
+/// not late: the last picture stays for it, too. The clock starts with the first call
 /// at which a picture is ready; a time that runs backwards counts as no time. `moment` may be NULL.
 /// Returns errors of the source, each once; playback then stands on the last picture.
 RELIT_API relit_result relit_update(relit_player* player, int64_t now_ns,

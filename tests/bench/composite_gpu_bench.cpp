@@ -107,7 +107,8 @@ struct Scene {
   }
 };
 
-/// Sheets of its own, and the barest shader: every fetch of the composite, added up.
+/// Sheets of its own, and the barest shader: every fetch of the composite, added up. Without
+/// weights, also where each plane has three.
 class Floor {
  public:
   static Result<Floor> create(const Device& device, const Scene& scene) {

@@ -150,7 +150,7 @@ TEST_CASE("the ring and the packets keep within their bytes") {
   }
   const auto stats = prefetcher->stats();
   CHECK(largest > 0);
-  // One frame more is kept for what is shown, or stands in.
+  // One frame more is kept for what is shown.
   const std::size_t frame = stats.ring_bytes_peak / std::max<std::size_t>(stats.ring_frames, 1);
   CHECK(stats.ring_bytes_peak <= options.ring_bytes + 2 * frame);
   CHECK(stats.picture_bytes_peak >= stats.ring_bytes_peak / 2);
@@ -282,16 +282,81 @@ TEST_CASE("an unevenly spaced clip is found by its ticks") {
   for (const std::uint64_t tick : {5u, 0u, 3u, 2u, 4u, 1u}) {
     const auto want = reader->frame_at(tick);
     REQUIRE(want);
-    const auto got = prefetcher->frame_at(tick);
-    INFO(tick << (got ? "" : got.error().message));
+    prefetcher->want_tick(tick);
+    const auto known = prefetcher->wait_tick(tick, kPatience_s);
+    INFO(tick << (known ? "" : known.error().message));
+    REQUIRE(known);
+    REQUIRE(*known);
+    const auto got = prefetcher->span_at_tick(tick);
     REQUIRE(got);
-    CHECK(*got == *want);
-    CHECK(fetched(*prefetcher, *got) == expected[*got]);
-    CHECK(prefetcher->first_tick(*got) <= tick);
+    CHECK(got->frame == *want);
+    CHECK(fetched(*prefetcher, got->frame) == expected[got->frame]);
+    CHECK(prefetcher->first_tick(got->frame) <= tick);
   }
-  const auto beyond = prefetcher->frame_at(6);
+  prefetcher->want_tick(6);
+  const auto beyond = prefetcher->wait_tick(6, kPatience_s);
   REQUIRE_FALSE(beyond);
   CHECK(beyond.error().code == ErrorCode::kNotFound);
+}
+
+TEST_CASE("the segment of a tick is come to by going on where it is the next one") {
+  const auto file = small_clip();
+  const auto expected = all_frames(file);
+  for (const bool pipe : {false, true}) {
+    std::unique_ptr<container::ByteSource> source = memory_source(file);
+    if (pipe) source = std::make_unique<PipeSource>(file);
+    auto options = patient();
+    options.ring_bytes = options.packet_bytes = 0;
+    auto prefetcher = prefetch(std::move(source), options);
+    for (const std::uint64_t tick : {0u, 4u}) {
+      prefetcher->want_tick(tick);
+      REQUIRE(prefetcher->wait_tick(tick, kPatience_s).value());
+      const std::uint64_t frame = prefetcher->span_at_tick(tick)->frame;
+      CHECK(fetched(*prefetcher, frame) == expected[frame]);
+    }
+    CHECK(prefetcher->stats().restarts == 0);
+  }
+}
+
+TEST_CASE("the segment of a tick may be missing, which is an error until playback goes elsewhere") {
+  auto file = small_clip();
+  auto reader = container::Reader::open(memory_source(file));
+  REQUIRE(reader);
+  file[reader->read_index()->segments[1].offset + 30] ^= 1;  // the segment's record itself
+  auto prefetcher = prefetch(memory_source(file), patient());
+  for (int i = 0; i < 3; ++i) {
+    prefetcher->want_tick(5);
+    const auto missing = prefetcher->wait_tick(5, kPatience_s);
+    REQUIRE_FALSE(missing);
+    CHECK(missing.error().code == ErrorCode::kNotFound);
+    CHECK_FALSE(prefetcher->error());
+  }
+  CHECK(prefetcher->stats().restarts <= 1);
+  (void)fetched(*prefetcher, 1);
+  CHECK(prefetcher->error());
+}
+
+TEST_CASE("for a frame that damage hit what is shown stays, not what was decoded last") {
+  const auto file = damaged_clip();
+  const auto expected = all_frames(file);
+  auto reader = container::Reader::open(memory_source(file));
+  REQUIRE(reader);
+  const std::uint64_t hurt = reader->read_index()->segments[1].first_frame;
+  REQUIRE(expected[hurt] == expected[hurt - 1]);
+  auto options = patient();
+  options.ring_bytes = std::size_t{128} << 20;  // more than a segment
+  auto prefetcher = prefetch(memory_source(file), options);
+  // Before anything is shown there is only what was decoded.
+  REQUIRE(prefetcher->wait(hurt - 1, kPatience_s));
+  REQUIRE(prefetcher->wait(hurt, kPatience_s));
+  const ClipFrame* before = prefetcher->frame(hurt);
+  REQUIRE(before != nullptr);
+  // Not so that a failure prints megabytes.
+  const bool is_last_good = fingerprint(*before) == expected[hurt - 1];
+  CHECK(is_last_good);
+  for (std::uint64_t k = 0; k < 3; ++k) CHECK(fetched(*prefetcher, k) == expected[k]);
+  CHECK(fetched(*prefetcher, hurt + 3) == expected[2]);
+  CHECK(prefetcher->loss().frames == 1);
 }
 
 TEST_CASE("an impatient prefetcher gives its first picture without all layers, then with them") {
