@@ -3,6 +3,7 @@
 #include <string>
 #include <type_traits>
 
+#include "container/base/limits.hpp"
 #include "container/base/out_of_memory.hpp"
 #include "container/reader.hpp"
 #include "container/references.hpp"
@@ -61,6 +62,9 @@ Result<Gathered> gather(Reader& reader) {
     if (ended && *ended) return found;
     auto record = ended ? reader.next() : Result<std::optional<Record>>(Unexpected{ended.error()});
     if (record && !*record) return found;
+    if (found.records.size() == limits::kStaticRecords)
+      return fail(ErrorCode::kLimit, "more than " + std::to_string(limits::kStaticRecords) +
+                                         " records before the first segment");
     if (record) {
       found.records.push_back(std::move(*record));
       continue;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <string>
 
+#include "container/base/limits.hpp"
 #include "container/base/out_of_memory.hpp"
 #include "container/record_codec.hpp"
 #include "container/references.hpp"
@@ -446,6 +447,9 @@ Result<std::vector<std::optional<Record>>> read_copies_from_end(RecordInput& inp
       input.skip();
       continue;
     }
+    if (records.size() == limits::kStaticRecords)
+      return fail(ErrorCode::kLimit,
+                  "there are more than " + std::to_string(limits::kStaticRecords) + " copies");
     bytes += (*header)->payload_bytes;
     if (bytes > options.max_static_bytes || (*header)->payload_bytes > options.max_record_bytes)
       return fail(ErrorCode::kLimit, "the copies exceed the limit of " +

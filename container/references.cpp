@@ -54,6 +54,7 @@ Status ReferenceChecker::add(const MaterialRecord& record) {
 Status ReferenceChecker::add(const MeshRecord& record) {
   RELIT_TRY(note(meshes_, record.id, limits::kMeshes, "mesh"));
   RELIT_TRY(exists(materials_, record.material_id, "material"));
+  RELIT_TRY(add_geometry(record));
   joints_used_ |= std::ranges::any_of(
       record.streams, [](const VertexStream& s) { return s.semantic == Semantic::kJoints; });
   if (!record.morph_targets.empty())
@@ -61,6 +62,16 @@ Status ReferenceChecker::add(const MeshRecord& record) {
         std::max(morph_weights_used_, record.first_morph_weight +
                                           static_cast<std::uint32_t>(record.morph_targets.size()));
   return {};
+}
+
+/// A mesh of the greatest size takes some hundred bytes of a file: zeros compress well.
+Status ReferenceChecker::add_geometry(const MeshRecord& record) {
+  vertices_ += record.vertex_count;
+  indices_ += record.index_count;
+  morph_offsets_ += std::uint64_t{record.vertex_count} * record.morph_targets.size();
+  RELIT_TRY(at_most(vertices_, limits::kVertices, "number of vertices of all meshes"));
+  RELIT_TRY(at_most(indices_, limits::kIndices, "number of indices of all meshes"));
+  return at_most(morph_offsets_, limits::kMorphOffsets, "number of morph offsets of all meshes");
 }
 
 Status ReferenceChecker::add(const SkeletonRecord& record) {

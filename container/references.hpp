@@ -57,6 +57,7 @@ class ReferenceChecker {
     std::uint32_t planes = 0;
   };
 
+  Status add_geometry(const MeshRecord& record);
   Status add_track(std::uint32_t track_id, Clip& clip);
   [[nodiscard]] static Status check_rate(std::uint32_t clip_id, const Clip& clip);
 
@@ -64,6 +65,7 @@ class ReferenceChecker {
   std::set<std::uint32_t> images_;
   std::set<std::uint32_t> materials_;
   std::set<std::uint32_t> meshes_;
+  std::uint64_t vertices_ = 0, indices_ = 0, morph_offsets_ = 0;  ///< of all meshes
   std::map<std::uint32_t, Model> models_;
   std::set<std::uint32_t> layers_;
   std::set<std::uint32_t> tracks_;

@@ -5,18 +5,31 @@
 
 namespace relit::container {
 
+std::uint64_t Timeline::Run::end(std::uint64_t number) const {
+  return ends.empty() ? first_tick + number + 1 : ends[static_cast<std::size_t>(number)];
+}
+
+std::uint64_t Timeline::Run::start(std::uint64_t number) const {
+  return number == 0 ? first_tick : end(number - 1);
+}
+
 void Timeline::add(const SegmentRecord& segment) {
   if (even_) return;
-  Run& run = runs_[segment.first_tick];
-  run.first_frame = segment.first_frame;
-  run.starts.clear();
-  run.starts.reserve(segment.frame_count + std::size_t{1});
-  std::uint64_t tick = segment.first_tick;
-  for (std::uint32_t i = 0; i < segment.frame_count; ++i) {
-    run.starts.push_back(tick);
-    tick += segment.durations.empty() ? 1 : segment.durations[i];
+  const auto [at, fresh] = runs_.try_emplace(segment.first_tick);
+  Run& run = at->second;
+  if (!fresh) {
+    const auto known = ticks_.find(run.first_frame);
+    if (known != ticks_.end() && known->second == run.first_tick) ticks_.erase(known);
   }
-  run.starts.push_back(tick);
+  run.first_frame = segment.first_frame;
+  run.first_tick = segment.first_tick;
+  run.frame_count = segment.frame_count;
+  run.ends.clear();
+  run.ends.reserve(segment.durations.size());
+  std::uint64_t tick = segment.first_tick;
+  for (const std::uint32_t ticks : segment.durations) run.ends.push_back(tick += ticks);
+  run.end_tick = segment.first_tick + container::duration_ticks(segment);
+  ticks_.insert_or_assign(segment.first_frame, segment.first_tick);
 }
 
 std::optional<std::uint64_t> Timeline::frame_at(std::uint64_t tick) const {
@@ -24,31 +37,32 @@ std::optional<std::uint64_t> Timeline::frame_at(std::uint64_t tick) const {
   auto next = runs_.upper_bound(tick);
   if (next == runs_.begin()) return std::nullopt;
   const Run& run = std::prev(next)->second;
-  if (tick >= run.starts.back()) return std::nullopt;
-  const auto start = std::prev(std::ranges::upper_bound(run.starts, tick));
-  return run.first_frame + static_cast<std::uint64_t>(start - run.starts.begin());
+  if (tick >= run.end_tick) return std::nullopt;
+  if (run.ends.empty()) return run.first_frame + (tick - run.first_tick);
+  const auto shown = std::ranges::upper_bound(run.ends, tick);
+  return run.first_frame + static_cast<std::uint64_t>(shown - run.ends.begin());
 }
 
 const Timeline::Run* Timeline::run_of(std::uint64_t frame) const {
-  for (const auto& [tick, run] : runs_) {
-    if (frame >= run.first_frame && frame - run.first_frame + 1 < run.starts.size()) return &run;
-  }
-  return nullptr;
+  const auto next = ticks_.upper_bound(frame);
+  if (next == ticks_.begin()) return nullptr;
+  const Run& run = runs_.at(std::prev(next)->second);
+  return frame - run.first_frame < run.frame_count ? &run : nullptr;
 }
 
 std::optional<std::uint64_t> Timeline::first_tick(std::uint64_t frame) const {
   if (even_) return frame < duration_ ? std::optional(frame) : std::nullopt;
   const Run* run = run_of(frame);
   if (run == nullptr) return std::nullopt;
-  return run->starts[static_cast<std::size_t>(frame - run->first_frame)];
+  return run->start(frame - run->first_frame);
 }
 
 std::optional<std::uint32_t> Timeline::ticks_of(std::uint64_t frame) const {
   if (even_) return frame < duration_ ? std::optional<std::uint32_t>(1) : std::nullopt;
   const Run* run = run_of(frame);
   if (run == nullptr) return std::nullopt;
-  const auto i = static_cast<std::size_t>(frame - run->first_frame);
-  return static_cast<std::uint32_t>(run->starts[i + 1] - run->starts[i]);
+  const std::uint64_t number = frame - run->first_frame;
+  return static_cast<std::uint32_t>(run->end(number) - run->start(number));
 }
 
 }  // namespace relit::container

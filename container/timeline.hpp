@@ -11,7 +11,8 @@
 namespace relit::container {
 
 /// When the frames of a clip are shown (FORMAT.md, section 3.1), as far as its segments are known.
-/// An evenly spaced clip needs none of them.
+/// An evenly spaced clip needs none of them. Takes no more memory than the segments' records, and
+/// finds frames in logarithmic time, whatever the segments say.
 class Timeline {
  public:
   Timeline() = default;
@@ -34,13 +35,20 @@ class Timeline {
  private:
   struct Run {
     std::uint64_t first_frame = 0;
-    std::vector<std::uint64_t> starts;  ///< ticks of each frame, and where the last one ends
+    std::uint64_t first_tick = 0;
+    std::uint64_t end_tick = 0;
+    std::uint32_t frame_count = 0;
+    std::vector<std::uint64_t> ends;  ///< tick at which each frame ends; empty: each lasts one
+    /// Of the frame of that number in the run.
+    [[nodiscard]] std::uint64_t end(std::uint64_t number) const;
+    [[nodiscard]] std::uint64_t start(std::uint64_t number) const;
   };
   [[nodiscard]] const Run* run_of(std::uint64_t frame) const;
 
   bool even_ = true;
   std::uint64_t duration_ = 0;
-  std::map<std::uint64_t, Run> runs_;  ///< by first tick
+  std::map<std::uint64_t, Run> runs_;             ///< by first tick
+  std::map<std::uint64_t, std::uint64_t> ticks_;  ///< first tick of a run by its first frame
 };
 
 }  // namespace relit::container

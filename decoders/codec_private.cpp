@@ -25,30 +25,36 @@ struct Obu {
   std::span<const std::uint8_t> payload;
 };
 
+/// Takes the first OBU off the front of `bytes`, which are not empty.
+Result<Obu> take_obu(std::span<const std::uint8_t>& bytes) {
+  Obu obu;
+  obu.type = (bytes[0] >> 3) & 15u;
+  obu.has_size = (bytes[0] & 2u) != 0;
+  const std::size_t header = (bytes[0] & 4u) != 0 ? 2 : 1;
+  if ((bytes[0] & 0x80u) != 0 || bytes.size() < header) return corrupt("not an AV1 OBU");
+  obu.header = bytes.first(header);
+  bytes = bytes.subspan(header);
+  std::uint64_t size = bytes.size();
+  if (obu.has_size) {
+    size = 0;
+    std::size_t i = 0;
+    for (bool more = true; more; ++i) {
+      if (i == 8 || i == bytes.size()) return corrupt("the size of an AV1 OBU does not end");
+      size |= std::uint64_t{bytes[i] & 0x7fu} << (7 * i);
+      more = (bytes[i] & 0x80u) != 0;
+    }
+    bytes = bytes.subspan(i);
+  }
+  if (size > bytes.size()) return corrupt("an AV1 OBU reaches beyond its packet");
+  obu.payload = bytes.first(static_cast<std::size_t>(size));
+  bytes = bytes.subspan(static_cast<std::size_t>(size));
+  return obu;
+}
+
 Result<std::vector<Obu>> split_obus(std::span<const std::uint8_t> bytes) {
   std::vector<Obu> obus;
   while (!bytes.empty()) {
-    Obu obu;
-    obu.type = (bytes[0] >> 3) & 15u;
-    obu.has_size = (bytes[0] & 2u) != 0;
-    const std::size_t header = (bytes[0] & 4u) != 0 ? 2 : 1;
-    if ((bytes[0] & 0x80u) != 0 || bytes.size() < header) return corrupt("not an AV1 OBU");
-    obu.header = bytes.first(header);
-    bytes = bytes.subspan(header);
-    std::uint64_t size = bytes.size();
-    if (obu.has_size) {
-      size = 0;
-      std::size_t i = 0;
-      for (bool more = true; more; ++i) {
-        if (i == 8 || i == bytes.size()) return corrupt("the size of an AV1 OBU does not end");
-        size |= std::uint64_t{bytes[i] & 0x7fu} << (7 * i);
-        more = (bytes[i] & 0x80u) != 0;
-      }
-      bytes = bytes.subspan(i);
-    }
-    if (size > bytes.size()) return corrupt("an AV1 OBU reaches beyond its packet");
-    obu.payload = bytes.first(static_cast<std::size_t>(size));
-    bytes = bytes.subspan(static_cast<std::size_t>(size));
+    RELIT_ASSIGN(const Obu obu, take_obu(bytes));
     obus.push_back(obu);
   }
   return obus;
@@ -195,8 +201,9 @@ Status check_packet(std::string_view codec, std::span<const std::uint8_t> packet
       }
     }
   } else if (codec == "av1") {
-    RELIT_ASSIGN(const std::vector<Obu> obus, split_obus(packet));
-    for (const Obu& obu : obus) {
+    // One by one: a list of them could take many times the packet's bytes.
+    for (auto rest = packet; !rest.empty();) {
+      RELIT_ASSIGN(const Obu obu, take_obu(rest));
       if (!obu.has_size) return corrupt("an AV1 OBU without a size");
       if (obu.type == kTemporalDelimiterObu) return corrupt("a temporal delimiter in a packet");
     }

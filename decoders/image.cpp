@@ -55,26 +55,36 @@ Unexpected truncated(std::string_view media_type) {
                                          "download it again");
 }
 
+constexpr std::size_t kPngSignature = 8;
+constexpr std::size_t kPngChunk = 12;  // length, type, CRC
+
+std::string_view chunk_type(std::span<const std::uint8_t> bytes, std::size_t at) {
+  return {reinterpret_cast<const char*>(bytes.data()) + at + 4, 4};
+}
+
 // The chunks are walked here because libavcodec returns the rows it has when the rest is missing.
 Result<StatedSize> check_png(std::span<const std::uint8_t> bytes) {
   StatedSize size;
-  std::size_t at = 8;
-  while (bytes.size() - at >= 12) {
+  std::size_t at = kPngSignature;
+  while (bytes.size() - at >= kPngChunk) {
     const std::uint64_t length = big_endian(bytes.subspan(at), 4);
-    const std::string_view type(reinterpret_cast<const char*>(bytes.data()) + at + 4, 4);
-    if (length > bytes.size() - at - 12) break;
+    const std::string_view type = chunk_type(bytes, at);
+    if (length > bytes.size() - at - kPngChunk) break;
     if (type == "IHDR" && length >= 8) {
       size = {big_endian(bytes.subspan(at + 8), 4), big_endian(bytes.subspan(at + 12), 4)};
     }
     if (type == "IEND") return size;
-    at += static_cast<std::size_t>(length) + 12;
+    at += static_cast<std::size_t>(length) + kPngChunk;
   }
   return truncated("image/png");
 }
 
-// Walks the markers up to the picture's end; entropy-coded data holds no marker but restarts.
+// Walks the markers up to the picture's end; entropy-coded data holds no marker but restarts. Each
+// scan goes over the whole picture, whatever it takes: files of many empty ones would keep a
+// decoder busy for hours.
 Result<StatedSize> check_jpeg(std::span<const std::uint8_t> bytes) {
   StatedSize size;
+  std::uint32_t scans = 0;
   std::size_t at = 2;
   while (at + 1 < bytes.size()) {
     if (bytes[at] != 0xff || bytes[at + 1] == 0xff || bytes[at + 1] == 0 ||
@@ -84,6 +94,11 @@ Result<StatedSize> check_jpeg(std::span<const std::uint8_t> bytes) {
     }
     const std::uint8_t marker = bytes[at + 1];
     if (marker == 0xd9) return size;
+    if (marker == 0xda && ++scans > limits::kImageScans) {
+      return fail(ErrorCode::kLimit, "the picture has more than " +
+                                         std::to_string(limits::kImageScans) +
+                                         " scans; save it with another program");
+    }
     if (bytes.size() - at < 4) break;
     const std::size_t length = big_endian(bytes.subspan(at + 2), 2);
     if (length < 2 || length > bytes.size() - at - 2) break;
@@ -112,6 +127,30 @@ Status check_size(const StatedSize& size) {
   return {};
 }
 
+/// Copies the file into `packet` and returns how many bytes it has there. Of PNG the chunks whose
+/// contents are compressed and not of the picture are left out: libavcodec would unpack texts and
+/// profiles of any size, a thousand times what they take here.
+std::size_t copy_picture(std::span<const std::uint8_t> bytes, bool png, std::uint8_t* packet) {
+  if (!png) {
+    std::memcpy(packet, bytes.data(), bytes.size());
+    return bytes.size();
+  }
+  std::size_t size = 0;
+  const auto keep = [&](std::size_t at, std::size_t length) {
+    std::memcpy(packet + size, bytes.data() + at, length);
+    size += length;
+  };
+  keep(0, kPngSignature);
+  for (std::size_t at = kPngSignature; bytes.size() - at >= kPngChunk;) {
+    const std::size_t length = big_endian(bytes.subspan(at), 4) + kPngChunk;
+    const std::string_view type = chunk_type(bytes, at);
+    if (type != "zTXt" && type != "iTXt" && type != "iCCP") keep(at, length);
+    if (type == "IEND") break;
+    at += length;
+  }
+  return size;
+}
+
 Result<ffmpeg::Frame> decode_frame(std::span<const std::uint8_t> bytes,
                                    std::string_view media_type) {
   const AVCodec* codec =
@@ -127,7 +166,8 @@ Result<ffmpeg::Frame> decode_frame(std::span<const std::uint8_t> bytes,
       av_new_packet(packet.get(), static_cast<int>(bytes.size())) < 0) {
     return fail(ErrorCode::kOutOfMemory, "no memory to decode a picture");
   }
-  std::memcpy(packet->data, bytes.data(), bytes.size());
+  const std::size_t copied = copy_picture(bytes, media_type == "image/png", packet->data);
+  av_shrink_packet(packet.get(), static_cast<int>(copied));
   context->thread_count = 1;
   context->max_pixels = static_cast<std::int64_t>(limits::kImageTexels);
   context->err_recognition = AV_EF_CRCCHECK | AV_EF_EXPLODE;

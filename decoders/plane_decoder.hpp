@@ -107,13 +107,14 @@ class TrackDecoder {
     std::uint64_t end_frame = 0;
     container::ChunkRecord record;
     std::vector<std::int64_t> shown;  ///< all pts, ascending
+    /// For each packet, the least pts of those from it on.
+    std::vector<std::int64_t> earliest;
   };
   using Chunks = std::map<std::uint64_t, Chunk>;  ///< by first frame
 
   TrackDecoder(VideoDecoder decoder, std::uint32_t track_id, int threads)
       : decoder_(std::move(decoder)), track_id_(track_id), threads_(threads) {}
-  Status list_shown(const container::SegmentRecord& segment, const container::ChunkRecord& chunk,
-                    std::vector<std::int64_t>& shown) const;
+  Status list_shown(const container::SegmentRecord& segment, Chunk& chunk) const;
   /// Whether `current_` is now the picture of that pts.
   bool decode_until(const Chunk& chunk, std::int64_t pts);
   [[nodiscard]] Chunks::const_iterator find(std::uint64_t frame) const;
@@ -131,6 +132,7 @@ class TrackDecoder {
   Chunks chunks_;
   std::optional<std::uint64_t> segment_;  ///< first frame of the chunk in the decoder
   std::size_t next_packet_ = 0;
+  std::size_t unshown_end_ = 0;  ///< no packet from the next one to this one is shown
   bool drained_ = false;
   bool skipping_ = false;  ///< after damage, until a key packet
   std::optional<Error> damage_;

@@ -9,9 +9,11 @@ namespace relit::decoders {
 namespace {
 
 glm::vec3 unit_or(const glm::vec3& v, const glm::vec3& otherwise) {
-  // Scaled first: cofactors of large matrices would overflow when squared.
+  // Scaled first: cofactors of large matrices would overflow when squared. What overflowed already
+  // may be NaN in one component alone, which max() does not see.
   const float largest = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
-  if (!(largest > 0.0f) || !std::isfinite(largest)) return otherwise;
+  const bool finite = std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+  if (!finite || largest == 0.0f) return otherwise;
   const glm::vec3 scaled = v / largest;
   return scaled / std::sqrt(glm::dot(scaled, scaled));
 }

@@ -15,21 +15,21 @@ Result<TrackDecoder> TrackDecoder::open(const VideoFormat& format,
 }
 
 /// Checks the packets and notes when they are shown.
-Status TrackDecoder::list_shown(const container::SegmentRecord& segment,
-                                const container::ChunkRecord& chunk,
-                                std::vector<std::int64_t>& shown) const {
+Status TrackDecoder::list_shown(const container::SegmentRecord& segment, Chunk& chunk) const {
   const auto where = [&] {
     return "track " + std::to_string(track_id_) + ", segment " + std::to_string(segment.index) +
            ": ";
   };
+  const container::ChunkRecord& record = chunk.record;
+  std::vector<std::int64_t>& shown = chunk.shown;
   shown.clear();
   if (segment.frame_count == 0 || segment.frame_count > limits::kFramesPerSegment ||
-      segment.first_frame > limits::kFrames || chunk.packets.size() > limits::kPacketsPerChunk) {
+      segment.first_frame > limits::kFrames || record.packets.size() > limits::kPacketsPerChunk) {
     return fail(ErrorCode::kLimit, where() + "too many frames or packets, or none");
   }
   const std::uint64_t end_frame = segment.first_frame + segment.frame_count;
-  for (const container::Packet& packet : chunk.packets) {
-    if (packet.size > chunk.data.size() || packet.offset > chunk.data.size() - packet.size) {
+  for (const container::Packet& packet : record.packets) {
+    if (packet.size > record.data.size() || packet.offset > record.data.size() - packet.size) {
       return fail(ErrorCode::kCorrupt, where() + "a packet reaches outside its chunk");
     }
     if (packet.pts < static_cast<std::int64_t>(segment.first_frame) ||
@@ -39,6 +39,9 @@ Status TrackDecoder::list_shown(const container::SegmentRecord& segment,
     }
     shown.push_back(packet.pts);
   }
+  chunk.earliest = shown;
+  for (std::size_t i = shown.size(); i-- > 1;)
+    chunk.earliest[i - 1] = std::min(chunk.earliest[i - 1], chunk.earliest[i]);
   std::sort(shown.begin(), shown.end());
   if (std::adjacent_find(shown.begin(), shown.end()) != shown.end()) {
     return fail(ErrorCode::kCorrupt, where() + "two packets of one frame");
@@ -49,7 +52,8 @@ Status TrackDecoder::list_shown(const container::SegmentRecord& segment,
 Status TrackDecoder::add_chunk(const container::SegmentRecord& segment,
                                container::ChunkRecord chunk) {
   Chunk stored;
-  RELIT_TRY(list_shown(segment, chunk, stored.shown));
+  stored.record = std::move(chunk);
+  RELIT_TRY(list_shown(segment, stored));
   stored.end_frame = segment.first_frame + segment.frame_count;
   const auto next = chunks_.lower_bound(segment.first_frame);
   if ((next != chunks_.end() && next->first != segment.first_frame &&
@@ -60,7 +64,6 @@ Status TrackDecoder::add_chunk(const container::SegmentRecord& segment,
                                          ": its frames overlap those of another segment");
   }
   if (segment_ == segment.first_frame) segment_.reset();
-  stored.record = std::move(chunk);
   chunks_.insert_or_assign(segment.first_frame, std::move(stored));
   return {};
 }
@@ -72,7 +75,7 @@ Status TrackDecoder::replace_chunk(const container::SegmentRecord& segment,
   if (chunks_.empty()) chunks_.try_emplace(0);
   auto node = chunks_.extract(chunks_.begin());
   std::swap(node.mapped().record, chunk);
-  RELIT_TRY(list_shown(segment, node.mapped().record, node.mapped().shown));
+  RELIT_TRY(list_shown(segment, node.mapped()));
   node.key() = segment.first_frame;
   node.mapped().end_frame = segment.first_frame + segment.frame_count;
   chunks_.insert(std::move(node));
@@ -98,6 +101,7 @@ void TrackDecoder::restart(std::uint64_t first_frame) {
   }
   segment_ = first_frame;
   next_packet_ = 0;
+  unshown_end_ = 0;
   drained_ = false;
   skipping_ = false;
   damage_.reset();
@@ -140,15 +144,15 @@ bool TrackDecoder::is_shown(const Chunk& chunk, std::int64_t pts) const {
 
 // Packets are not even sent where no picture is shown before the next key packet, or to the end. A
 // key packet in mid-chunk is trusted to begin anew only where no picture after it comes before it
-// in time: such a one may refer to what was passed over.
+// in time: such a one may refer to what was passed over. What has been looked at is not looked at
+// again: segments of 65 536 packets would take as many passes.
 void TrackDecoder::pass_unshown(const Chunk& chunk) {
   const auto& packets = chunk.record.packets;
-  const auto begin = packets.begin() + static_cast<std::ptrdiff_t>(next_packet_);
-  for (auto at = begin; at != packets.end(); ++at) {
-    const auto precedes = [&](const container::Packet& packet) { return packet.pts < at->pts; };
-    if (at != begin && at->key && std::none_of(at, packets.end(), precedes))
-      next_packet_ = static_cast<std::size_t>(at - packets.begin());
-    if (is_shown(chunk, at->pts)) return;
+  for (std::size_t at = std::max(unshown_end_, next_packet_); at < packets.size(); ++at) {
+    const container::Packet& packet = packets[at];
+    if (at != next_packet_ && packet.key && packet.pts == chunk.earliest[at]) next_packet_ = at;
+    unshown_end_ = at;
+    if (is_shown(chunk, packet.pts)) return;
   }
   next_packet_ = packets.size();
 }
@@ -244,6 +248,7 @@ Result<const VideoFrame*> TrackDecoder::picture(std::uint64_t frame) {
   asked_ = -1;
   const bool foreseen = is_shown(chunk, expected);
   asked_ = expected;
+  if (!foreseen) unshown_end_ = 0;
   if (segment_ != found->first || (!current_.empty() && current_.pts() > expected)) {
     restart(found->first);
   }

@@ -20,11 +20,9 @@ struct Arguments {
 
 Status write_mask(const ClipReader& clip, const std::string& path) {
   const int width = clip.model().width, height = clip.model().height;
-  std::vector<std::uint8_t> mask(static_cast<std::size_t>(width) * static_cast<std::size_t>(height),
-                                 0);
-  for (const decoders::Mesh& mesh : clip.meshes()) {
-    decoders::mark_covered_texels(mesh.lightmap_uv, mesh.indices, width, height, mask);
-  }
+  std::vector<std::uint8_t> mask(static_cast<std::size_t>(width) *
+                                 static_cast<std::size_t>(height));
+  RELIT_TRY(decoders::mark_covered_texels(clip.meshes(), width, height, mask));
   const std::uint64_t shape[] = {static_cast<std::uint64_t>(height),
                                  static_cast<std::uint64_t>(width)};
   RELIT_ASSIGN(NpyWriter writer, NpyWriter::create(path, NpyWriter::Type::kUint8, shape));

@@ -16,8 +16,6 @@ namespace flags = container::flags;
 /// More than a file may have: originals and copies of every kind.
 constexpr std::size_t kMostStatics = 1u << 16;
 
-const int kSegmentOrder = container::order_of(types::kSegment);
-
 class Surveyor {
  public:
   explicit Surveyor(container::RecordScan& scan) : scan_(scan) {}
@@ -41,7 +39,7 @@ class Surveyor {
     const bool known =
         order >= 0 && (record.header.flags & flags::kCriticalMask & ~flags::kKnownCritical) == 0;
     if (!known) return take_unknown(record);
-    if (order < kSegmentOrder) return take_static(record, copy);
+    if (order < container::order_of(types::kSegment)) return take_static(record, copy);
     if (type == types::kSegment) return take_segment(record);
     if (type == types::kIndex && record.intact && !found_.index) {
       auto index = container::parse_index(scan_.payload());

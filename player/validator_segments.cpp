@@ -200,7 +200,8 @@ void SegmentChecker::end_segment() {
 void SegmentChecker::abandon() { end_segment(); }
 
 void SegmentChecker::note_loss(std::uint64_t begin, std::uint64_t end) {
-  lost_.emplace_back(begin, end);
+  // In the order of the file, so that the last range that begins before a place tells of all.
+  lost_.emplace_back(begin, lost_.empty() ? end : std::max(end, lost_.back().second));
 }
 
 void SegmentChecker::note_lost_segment(const FindingPlace& place, std::uint64_t record_bytes) {
@@ -210,8 +211,9 @@ void SegmentChecker::note_lost_segment(const FindingPlace& place, std::uint64_t 
 }
 
 bool SegmentChecker::lost_between(std::uint64_t begin, std::uint64_t end) const {
-  return std::ranges::any_of(
-      lost_, [&](const auto& range) { return range.first < end && begin < range.second; });
+  const auto behind =
+      std::ranges::lower_bound(lost_, end, {}, [](auto& range) { return range.first; });
+  return behind != lost_.begin() && begin < std::prev(behind)->second;
 }
 
 void SegmentChecker::index(const FindingPlace& place, const IndexRecord& record) {

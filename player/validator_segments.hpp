@@ -73,7 +73,7 @@ class SegmentChecker {
   std::optional<std::uint32_t> last_number_;
   std::map<std::uint32_t, Progress> progress_;       ///< by clip
   std::vector<container::IndexRecord::Entry> seen_;  ///< all segments, as an index has them
-  std::vector<std::pair<std::uint64_t, std::uint64_t>> lost_;  ///< ranges of bytes
+  std::vector<std::pair<std::uint64_t, std::uint64_t>> lost_;  ///< bytes; ends never fall
 };
 
 }  // namespace relit::player

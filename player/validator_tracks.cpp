@@ -82,9 +82,10 @@ void TrackChecker::open_coverage(const StaticChecker& statics) {
     const ModelRecord& record = model.record;
     Coverage coverage{&record, {}};
     coverage.mask.resize(std::size_t{record.width} * record.height);
-    for (const decoders::Mesh& mesh : *statics.meshes())
-      decoders::mark_covered_texels(mesh.lightmap_uv, mesh.indices, record.width, record.height,
-                                    coverage.mask);
+    // No rule forbids charts that overlap; without the mask, transfer is not looked at.
+    if (!decoders::mark_covered_texels(*statics.meshes(), record.width, record.height,
+                                       coverage.mask))
+      return;
     coverage_.push_back(std::move(coverage));
   }
 }

@@ -19,6 +19,7 @@ inline constexpr std::uint32_t kLightMapSide = 4096;    ///< texels
 inline constexpr std::uint32_t kVideoSide = 16384;      ///< samples of a coded picture
 inline constexpr std::uint32_t kImageSide = 16384;      ///< texels of an albedo image
 inline constexpr std::uint64_t kImageTexels = 1ull << 26;
+inline constexpr std::uint32_t kImageScans = 256;  ///< of a JPEG picture
 inline constexpr std::uint32_t kShOrder = 3;
 inline constexpr std::uint32_t kCoefficients = 16;
 inline constexpr std::uint32_t kPlanes = 256;  ///< of one model
@@ -27,10 +28,17 @@ inline constexpr std::uint32_t kClips = 1024;
 inline constexpr std::uint32_t kMeshes = 4096;
 inline constexpr std::uint32_t kMaterials = 4096;
 inline constexpr std::uint32_t kImages = 4096;
+/// Before the first segment: what each kind may have, a pose track for each clip, HEAD and SKEL.
+inline constexpr std::uint32_t kStaticRecords =
+    2 * kClips + kImages + kMaterials + kMeshes + 2 * kLayers + 2;
 inline constexpr std::uint32_t kVerticesPerMesh = 65535;  ///< 16-bit indices, GLES 2
 inline constexpr std::uint32_t kIndicesPerMesh = 3u * 1048576u;
 inline constexpr std::uint32_t kVertexStreams = 16;  ///< of one mesh
 inline constexpr std::uint32_t kMorphTargets = 1024;
+inline constexpr std::uint64_t kVertices = 1ull << 22;  ///< of all meshes
+inline constexpr std::uint64_t kIndices = 1ull << 25;   ///< of all meshes
+inline constexpr std::uint64_t kMorphOffsets =
+    1ull << 26;  ///< vertices times morph targets, of all meshes
 inline constexpr std::uint32_t kNodes = 65535;
 inline constexpr std::uint32_t kPalette = 65535;       ///< (node, inverse bind matrix) pairs
 inline constexpr std::uint32_t kMorphWeights = 65535;  ///< of one skeleton

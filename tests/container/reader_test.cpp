@@ -497,3 +497,38 @@ TEST_CASE("a file without segments has its copies behind the static part") {
   CHECK(all->errors.empty());
   CHECK(all->finished);
 }
+
+namespace {
+
+/// A file of CLIP records of no more than 110 bytes each, all with these flags.
+Bytes file_of_clips(std::uint32_t count, std::uint32_t record_flags) {
+  Bytes file(kSignature.begin(), kSignature.end());
+  const auto add = [&](RecordType type, const Bytes& payload, std::uint32_t its_flags) {
+    const Bytes record = frame_record(type, payload, its_flags);
+    file.insert(file.end(), record.begin(), record.end());
+  };
+  add(types::kHeader, serialize(HeaderRecord{}), 0);
+  const std::uint64_t clips = file.size();
+  for (std::uint32_t id = 0; id < count; ++id)
+    add(types::kClip, serialize(sample::clip(id)), record_flags);
+  const std::uint64_t whole = file.size() + record_bytes(kEndPayloadBytes);
+  add(types::kEnd, serialize(EndRecord{0, whole, record_flags == 0 ? 0 : clips}), 0);
+  return file;
+}
+
+}  // namespace
+
+TEST_CASE("more records before the first segment than can be valid are not kept") {
+  // Each takes several times its bytes in memory; which of them are wrong would be found only
+  // behind the last.
+  const auto many = read_everything(memory(file_of_clips(limits::kStaticRecords + 1, 0)));
+  REQUIRE_FALSE(many);
+  CHECK(many.error().code == ErrorCode::kLimit);
+  const auto fewer = read_everything(memory(file_of_clips(limits::kClips, 0)));
+  CHECK(fewer);
+  auto reader =
+      Reader::open(memory(file_of_clips(limits::kStaticRecords + 1, flags::kCopy))).value();
+  CHECK(reader.read_copies().error().code == ErrorCode::kLimit);
+  reader = Reader::open(memory(file_of_clips(3, flags::kCopy))).value();
+  CHECK(reader.read_copies().value().size() == 3);
+}

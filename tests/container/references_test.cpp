@@ -103,3 +103,31 @@ TEST_CASE("planes fit their model, and a clip has one pose track") {
           p.meshes[1].id = 12;
         }).find("one vertex range for each mesh") != std::string::npos);
 }
+
+TEST_CASE("what all meshes together decode to is limited") {
+  const auto of_meshes = [](std::uint64_t count, auto&& change) {
+    return refusal([&](Parts& p) {
+      MeshRecord mesh = p.meshes[0];
+      change(mesh);
+      p.poses.clear();
+      p.meshes.clear();
+      for (std::uint64_t i = 0; i < count; ++i) {
+        mesh.id = static_cast<std::uint32_t>(i);
+        p.meshes.push_back(mesh);
+      }
+    });
+  };
+  const auto vertices = [](MeshRecord& m) { m.vertex_count = 1u << 15; };
+  CHECK(of_meshes(limits::kVertices >> 15, vertices) == "");
+  CHECK(of_meshes((limits::kVertices >> 15) + 1, vertices).find("vertices of all meshes") !=
+        std::string::npos);
+  const auto indices = [](MeshRecord& m) { m.index_count = limits::kIndicesPerMesh; };
+  const std::uint64_t most = limits::kIndices / limits::kIndicesPerMesh;
+  CHECK(of_meshes(most, indices) == "");
+  CHECK(of_meshes(most + 1, indices).find("indices of all meshes") != std::string::npos);
+  const auto morphs = [](MeshRecord& m) {
+    m.vertex_count = limits::kVerticesPerMesh;
+    m.morph_targets.resize(limits::kMorphTargets);
+  };
+  CHECK(of_meshes(2, morphs).find("morph offsets of all meshes") != std::string::npos);
+}

@@ -107,3 +107,42 @@ TEST_CASE("the index knows when its segments begin") {
   REQUIRE(reader.seek_to_segment(lie));
   CHECK_FALSE(reader.next());
 }
+
+TEST_CASE("segments of many frames cost no more than their records") {
+  // As ticks of each frame these would take 32 GiB.
+  constexpr std::uint64_t kSegments = 1 << 16;
+  ClipRecord clip = uneven_clip(limits::kTicks);
+  clip.frame_count = kSegments * limits::kFramesPerSegment - 1;
+  Timeline timeline(clip);
+  SegmentRecord segment;
+  segment.frame_count = limits::kFramesPerSegment;
+  for (std::uint64_t i = 0; i < kSegments; ++i) {
+    segment.first_frame = segment.first_tick = i * limits::kFramesPerSegment;
+    timeline.add(segment);
+  }
+  for (const std::uint64_t frame :
+       {std::uint64_t{0}, std::uint64_t{65535}, std::uint64_t{65536}, (kSegments << 16) - 1}) {
+    CHECK(timeline.frame_at(frame) == frame);
+    CHECK(timeline.first_tick(frame) == frame);
+    CHECK(timeline.ticks_of(frame) == 1u);
+  }
+  CHECK_FALSE(timeline.frame_at(kSegments << 16));
+  CHECK_FALSE(timeline.first_tick(kSegments << 16));
+}
+
+TEST_CASE("a segment that starts at the same tick takes the place of the other") {
+  Timeline timeline(uneven_clip(14));
+  SegmentRecord segment;
+  segment.frame_count = 2;
+  timeline.add(segment);
+  CHECK(timeline.first_tick(1) == 1u);
+  segment.first_frame = 3;
+  segment.durations = {4, 5};
+  timeline.add(segment);
+  CHECK_FALSE(timeline.first_tick(1));
+  CHECK(timeline.first_tick(4) == 4u);
+  CHECK(timeline.ticks_of(4) == 5u);
+  CHECK(timeline.frame_at(3) == 3u);
+  CHECK(timeline.frame_at(8) == 4u);
+  CHECK_FALSE(timeline.frame_at(9));
+}

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "decoders/image.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cstdlib>
 #include <string>
 
@@ -155,4 +157,32 @@ TEST_CASE("other types are named and refused", "[image]") {
   CHECK(failure(make_flat_jpeg({1, 2, 3, 4})) == ErrorCode::kUnsupported);
   CHECK(image_media_type(make_flat_jpeg({1})) == "image/jpeg");
   CHECK(image_media_type(make_rgba_png(1, 1, {1, 2, 3, 4})) == "image/png");
+}
+
+TEST_CASE("texts and profiles beside a PNG's picture are not unpacked", "[image]") {
+  const Bytes rgba = ramp(64, 5);
+  const Bytes plain = make_rgba_png(4, 4, rgba);
+  constexpr std::size_t kBehindHeader = 8 + 25;
+  for (const char* type : {"zTXt", "iTXt", "iCCP"}) {
+    // A name, a method, and what no decompressor takes.
+    Bytes chunk;
+    relit::test::append_png_chunk(chunk, type, {'n', 0, 0, 0xff, 0xff, 0xff, 0xff});
+    Bytes file = plain;
+    file.insert(file.begin() + kBehindHeader, chunk.begin(), chunk.end());
+    CHECK(decoded_rgba(file, 4, 4) == rgba);
+  }
+}
+
+TEST_CASE("a JPEG of more scans than any encoder writes is refused", "[image]") {
+  const auto with_scans = [](std::size_t scans) {
+    const Bytes one = make_flat_jpeg({90});
+    // Its header and its data.
+    const auto scan = std::ranges::search(one, std::array<std::uint8_t, 2>{0xff, 0xda}).begin();
+    Bytes file(one.begin(), scan);
+    for (std::size_t i = 0; i < scans; ++i) file.insert(file.end(), scan, one.end() - 2);
+    file.insert(file.end(), {0xff, 0xd9});
+    return file;
+  };
+  CHECK(decoded_rgba(with_scans(2), 8, 8).size() == 256);
+  CHECK(failure(with_scans(relit::limits::kImageScans + 1)) == ErrorCode::kLimit);
 }

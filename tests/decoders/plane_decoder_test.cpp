@@ -337,3 +337,31 @@ TEST_CASE("picture bytes count the samples of every chroma format") {
   CHECK(picture_bytes(33, 17, container::Chroma::k420, 10) == 2 * (33 * 17 + 2 * 17 * 9));
   CHECK(picture_bytes(32, 16, container::Chroma::k444, 10) == 3072);
 }
+
+TEST_CASE("pictures that are not shown are passed over, in any order of packets") {
+  constexpr int kFrames = 12;
+  std::vector<std::vector<std::uint8_t>> pictures;
+  std::vector<std::int64_t> pts;
+  for (int i = 0; i < kFrames; ++i) {
+    pictures.push_back(picture(i));
+    pts.push_back(i);
+  }
+  Stream stream = encode(pictures, pts, 1);
+  const LayerRecord record = layer(stream, nullptr);
+  // Decode order 0 2 1 3 4 …: frame 1 comes behind one that is shown later.
+  std::swap(stream.chunk.packets[1], stream.chunk.packets[2]);
+  auto track = TrackDecoder::open(mantissa_format(record));
+  REQUIRE(track);
+  track->show_every(4);
+  REQUIRE(track->add_chunk(segment(0, kFrames), stream.chunk));
+  const auto shows = [&](std::uint64_t frame) {
+    const auto shown = track->picture(frame);
+    REQUIRE(shown);
+    CHECK((*shown)->pts() == static_cast<std::int64_t>(frame));
+    CHECK((*shown)->component(0).at(5, 0) == pictures[frame][5]);
+  };
+  for (const std::uint64_t frame : {0, 4, 8}) shows(frame);
+  CHECK(track->pictures() == 3);
+  // One that was passed over, and those that follow it.
+  for (const std::uint64_t frame : {5, 8, 0, 11, 4}) shows(frame);
+}

@@ -106,3 +106,13 @@ TEST_CASE("pose_mesh takes normals from the triangles where there are no others"
   decoders::pose_mesh(mesh, 0, pose, positions, normals);
   CHECK(normals[3] == glm::vec3(0, 1, 0));
 }
+
+TEST_CASE("normals stay finite where cross products overflow") {
+  const Mesh mesh = test::decoded_quad(0);
+  Pose pose;
+  // The cross product of the first triangle's edges is (-1, inf - inf, 1).
+  pose.vertices = {{{0, 0, 0}, {1e21f, 0, 1e21f}, {1e21f, 1e-21f, 1e21f}, {0, 0, 0}}};
+  std::vector<glm::vec3> positions(4), normals(4);
+  decoders::pose_mesh(mesh, 0, pose, positions, normals);
+  for (const glm::vec3& n : normals) CHECK(std::abs(glm::length(n) - 1) < 1e-6f);
+}

@@ -8,8 +8,10 @@
 #include <initializer_list>
 #include <iterator>
 #include <memory>
+#include <set>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "container/reader.hpp"
@@ -21,6 +23,7 @@
 #include "tests/decoders/mesh_fixture.hpp"
 #include "tests/fuzz/encoder_form.hpp"
 #include "tests/fuzz/file_parts.hpp"
+#include "tests/fuzz/vector_choice.hpp"
 #include "tests/player/coded_file.hpp"
 
 /// `relit-seeds FOLDER [VECTORS]` writes the first inputs of every fuzzer to FOLDER/<fuzzer>/. They
@@ -38,7 +41,9 @@ class Seeds {
  public:
   explicit Seeds(fs::path root) : root_(std::move(root)) {}
 
+  /// Once, however often the same bytes come.
   void add(const std::string& fuzzer, const std::string& name, const Bytes& bytes) {
+    if (!known_.emplace(fuzzer, bytes).second) return;
     fs::create_directories(root_ / fuzzer);
     std::ofstream out(root_ / fuzzer / name, std::ios::binary);
     out.write(reinterpret_cast<const char*>(bytes.data()),
@@ -51,6 +56,7 @@ class Seeds {
 
  private:
   fs::path root_;
+  std::set<std::pair<std::string, Bytes>> known_;
   bool failed_ = false;
   int count_ = 0;
 };
@@ -84,46 +90,68 @@ void add_records(Seeds& seeds, const Bytes& file, const std::string& name) {
   }
 }
 
-/// A whole file for each way in which the fuzzers of files may take it.
+/// The ways in which the fuzzers of files may take one; the first byte of their inputs.
+constexpr std::array<std::uint8_t, 4> kReadingWays{0, 17, 34, 56};
+constexpr std::array<std::uint8_t, 5> kPlayingWays{0, 1, 2, 8, 4};
+constexpr std::array<std::uint8_t, 3> kCheckingWays{0, 1, 2};  // fields, payloads, recovery
+constexpr std::array<std::uint8_t, 4> kStarvingWays{0, 17, 34, 128};
+
+void add_way(Seeds& seeds, const char* fuzzer, const Bytes& file, const std::string& name,
+             std::uint8_t how) {
+  const bool starving = fuzzer == std::string_view("alloc_fuzz");  // after 40 allocations
+  seeds.add(fuzzer, name + "_" + std::to_string(how),
+            with_prefix(starving ? Bytes{how, 40, 0} : Bytes{how}, file));
+}
+
+/// What the decoders see of it.
+void add_decoded(Seeds& seeds, const Bytes& file, const std::string& name) {
+  for (const std::uint8_t how : Numbers{0, 0x80}) add_way(seeds, "decode_fuzz", file, name, how);
+}
+
+/// A whole file in every way.
 void add_file(Seeds& seeds, const Bytes& file, const std::string& name) {
-  for (const std::uint8_t how : Numbers{0, 17, 34, 56})
-    seeds.add("container_fuzz", name + "_" + std::to_string(how), with_prefix({how}, file));
-  for (const std::uint8_t how : Numbers{0, 1, 2, 8}) {
-    const std::string variant = name + "_" + std::to_string(how);
-    seeds.add("play_fuzz", variant, with_prefix({how}, file));
-    seeds.add("alloc_fuzz", variant,
-              with_prefix({static_cast<std::uint8_t>(how * 16 + how % 4), 40, 0}, file));
-  }
-  seeds.add("play_fuzz", name + "_ticks", with_prefix({4}, file));
-  seeds.add("validate_fuzz", name, with_prefix({0}, file));
-  seeds.add("validate_fuzz", name + "_deep", with_prefix({1}, file));
-  seeds.add("validate_fuzz", name + "_recover", with_prefix({2}, file));
-  // Of all the others the decoders see nothing new.
-  const bool coded = name.starts_with("coding") || name.starts_with("exponents") ||
-                     name.starts_with("rig") || name.starts_with("small");
-  for (const std::uint8_t how : Numbers{0, 0x80})
-    if (coded) seeds.add("decode_fuzz", name + "_" + std::to_string(how), with_prefix({how}, file));
+  for (const std::uint8_t how : kReadingWays) add_way(seeds, "container_fuzz", file, name, how);
+  for (const std::uint8_t how : kPlayingWays) add_way(seeds, "play_fuzz", file, name, how);
+  for (const std::uint8_t how : kCheckingWays) add_way(seeds, "validate_fuzz", file, name, how);
+  for (const std::uint8_t how : kStarvingWays) add_way(seeds, "alloc_fuzz", file, name, how);
+  add_decoded(seeds, file, name);
   add_records(seeds, file, name);
 }
 
-/// One file with each edit that decode_fuzz knows, and values around the limits of most of them.
-void add_edits(Seeds& seeds, const Bytes& file, const std::string& name) {
+/// One of many files, in one way for each fuzzer: another for each number.
+void add_once(Seeds& seeds, const Bytes& file, const std::string& name, std::size_t number) {
+  add_way(seeds, "container_fuzz", file, name, kReadingWays[number % kReadingWays.size()]);
+  add_way(seeds, "play_fuzz", file, name, kPlayingWays[number % kPlayingWays.size()]);
+  add_way(seeds, "alloc_fuzz", file, name, kStarvingWays[number % kStarvingWays.size()]);
+  for (const std::uint8_t how : {kCheckingWays[1], kCheckingWays[2]})
+    add_way(seeds, "validate_fuzz", file, name, how);
+}
+
+/// Whether decode_fuzz's edit changes a layer or a plane, of which one file has more than the
+/// other.
+bool is_of_layers(std::uint8_t which) { return which % 5 == 1 || which % 5 == 2; }
+
+/// One file with edits that decode_fuzz knows, and values around the limits of most of them. `all`:
+/// each; else those of layers and chunks.
+void add_edits(Seeds& seeds, const Bytes& file, const std::string& name, bool all) {
   constexpr std::uint8_t kStatic = 60, kChunk = 200, kChunkEnd = 207;
-  const auto add = [&](std::uint8_t which) {
-    for (const std::uint16_t value : Values{0, 1, 3, 5, 6, 270, 40000, 65535}) {
-      const auto low = static_cast<std::uint8_t>(value & 255);
-      const auto high = static_cast<std::uint8_t>(value >> 8);
-      for (const std::uint8_t how : Numbers{1, 0x81}) {
-        if (how != 1 && which < kChunk) continue;
-        seeds.add("decode_fuzz",
-                  name + "_edit" + std::to_string(how) + "_" + std::to_string(which) + "_" +
-                      std::to_string(value),
-                  with_prefix({how, which, low, high}, file));
-      }
-    }
+  const auto add = [&](std::uint8_t how, std::uint8_t which, std::uint16_t value) {
+    seeds.add("decode_fuzz",
+              name + "_edit" + std::to_string(how) + "_" + std::to_string(which) + "_" +
+                  std::to_string(value),
+              with_prefix({how, which, static_cast<std::uint8_t>(value & 255),
+                           static_cast<std::uint8_t>(value >> 8)},
+                          file));
   };
-  for (std::uint8_t which = 0; which < kStatic; ++which) add(which);
-  for (std::uint8_t which = kChunk; which < kChunkEnd; ++which) add(which);
+  constexpr std::array<std::uint16_t, 4> kOthers{1, 5, 270, 65535};
+  for (std::uint8_t which = 0; which < kStatic; ++which) {
+    if (!all && !is_of_layers(which)) continue;
+    for (const std::uint16_t value : Values{0, 3, 40000, kOthers[which % kOthers.size()]})
+      add(1, which, value);
+  }
+  for (std::uint8_t which = kChunk; which < kChunkEnd; ++which)
+    for (const std::uint16_t value : Values{0, 1, 6, 270, 40000, 65535})
+      for (const std::uint8_t how : Numbers{1, 0x81}) add(how, which, value);
 }
 
 Bytes unpacked(const Bytes& frame) {
@@ -444,10 +472,31 @@ void add_models(Seeds& seeds) {
   seeds.add("gltf_fuzz", "full.gltf", text(full.gltf()));
 }
 
-void add_vector(Seeds& seeds, const Bytes& file, const std::string& name) {
-  add_file(seeds, file, name);
-  if (name.starts_with("coding") || name.starts_with("packets-b")) add_streams(seeds, file, name);
-  if (name == "rig-morph") add_edits(seeds, file, name);
+void add_vectors(Seeds& seeds, const fs::path& folder) {
+  constexpr std::uintmax_t kMostBytes = 1 << 16;
+  fuzz::VectorChoice choice;
+  std::size_t chosen = 0;
+  for (const fs::path& path : fuzz::relit_files(folder)) {
+    if (fs::file_size(path) > kMostBytes) continue;
+    const Bytes file = read(path);
+    const std::string name = path.stem().string();
+    // What is wrong with a payload has one finding, and a line of code for each reason.
+    const bool of_payloads = name.starts_with("mesh") || name.starts_with("pose") ||
+                             name.starts_with("packet") || name.starts_with("skeleton");
+    if (choice.is_new(path))
+      add_once(seeds, file, name, chosen++);
+    else if (of_payloads)
+      add_way(seeds, "validate_fuzz", file, name, kCheckingWays[1]);
+    if (name.starts_with("rig")) add_way(seeds, "play_fuzz", file, name, kPlayingWays[0]);
+    if (name.starts_with("durations")) add_way(seeds, "play_fuzz", file, name, kPlayingWays[4]);
+    add_records(seeds, file, name);
+    const bool coded = name.starts_with("coding") || name.starts_with("packets-b");
+    if (coded) add_streams(seeds, file, name);
+    // Of all others the decoders see nothing new.
+    if (coded || name.starts_with("exponents") || name.starts_with("rig"))
+      add_decoded(seeds, file, name);
+    if (name == "rig-morph") add_edits(seeds, file, name, true);
+  }
 }
 
 void add_files(Seeds& seeds) {
@@ -457,7 +506,7 @@ void add_files(Seeds& seeds) {
       const Bytes file = player::test::coded_file({codec, exponents, exponents, !exponents});
       const std::string name = std::string("small_") + codec + (exponents ? "_exponents" : "");
       add_file(seeds, file, name);
-      if (exponents && codec == std::string_view("ffv1")) add_edits(seeds, file, name);
+      if (exponents && codec == std::string_view("ffv1")) add_edits(seeds, file, name, false);
     }
   }
 }
@@ -478,12 +527,7 @@ int main(int argc, char** argv) {
   add_lights(seeds);
   seeds.add("light_fuzz", "exr", with_prefix({'e'}, make_exr()));
   add_models(seeds);
-  constexpr std::uintmax_t kMostVectorBytes = 1 << 16;
-  if (argc == 3 && fs::is_directory(argv[2])) {
-    for (const auto& entry : fs::recursive_directory_iterator(argv[2]))
-      if (entry.path().extension() == ".relit" && entry.file_size() <= kMostVectorBytes)
-        add_vector(seeds, read(entry.path()), entry.path().stem().string());
-  }
+  if (argc == 3) add_vectors(seeds, argv[2]);
   std::printf("%d seeds\n", seeds.count());
   return seeds.failed() || !coded ? 1 : 0;
 }
