@@ -16,17 +16,17 @@ namespace {
 /// Of the composites' mean square: what is less is rounding, and what may be left out unasked.
 constexpr double kLeastEnergy = 1e-12, kSpare = 1e-5;
 
-using Matrix = Eigen::MatrixXd;
+using DenseMatrix = Eigen::MatrixXd;
 
-Matrix to_matrix(const std::vector<double>& values, Eigen::Index side) {
+DenseMatrix to_matrix(const std::vector<double>& values, Eigen::Index side) {
   return Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
       values.data(), side, side);
 }
 
 /// W for coefficients × channels: the channels do not mix.
-Matrix for_channels(const Matrix& per_coefficient) {
+DenseMatrix for_channels(const DenseMatrix& per_coefficient) {
   const Eigen::Index n = per_coefficient.rows();
-  Matrix all = Matrix::Zero(3 * n, 3 * n);
+  DenseMatrix all = DenseMatrix::Zero(3 * n, 3 * n);
   for (Eigen::Index i = 0; i < n; ++i)
     for (Eigen::Index j = 0; j < n; ++j)
       for (Eigen::Index c = 0; c < 3; ++c) all(3 * i + c, 3 * j + c) = per_coefficient(i, j);
@@ -133,17 +133,17 @@ PrincipalPlanes PrincipalAnalysis::finish(int count) const {
   const Eigen::Index values = 3 * planes.coefficients;
   const double samples = std::max(samples_, 1.0);
   Eigen::VectorXd mean(values);
-  Matrix covariance(values, values);
+  DenseMatrix covariance(values, values);
   for (Eigen::Index i = 0; i < values; ++i) mean[i] = sum_[static_cast<std::size_t>(i)] / samples;
   for (Eigen::Index i = 0; i < values; ++i)
     for (Eigen::Index j = i; j < values; ++j) {
       const double product = products_[static_cast<std::size_t>(i * values + j)] / samples;
       covariance(i, j) = covariance(j, i) = product - mean[i] * mean[j];
     }
-  const Eigen::SelfAdjointEigenSolver<Matrix> metric(
+  const Eigen::SelfAdjointEigenSolver<DenseMatrix> metric(
       for_channels(to_matrix(planes.metric, planes.coefficients)));
-  const Matrix root = metric.operatorSqrt(), inverse_root = metric.operatorInverseSqrt();
-  const Eigen::SelfAdjointEigenSolver<Matrix> axes(root * covariance * root);
+  const DenseMatrix root = metric.operatorSqrt(), inverse_root = metric.operatorInverseSqrt();
+  const Eigen::SelfAdjointEigenSolver<DenseMatrix> axes(root * covariance * root);
   planes.mean.assign(mean.data(), mean.data() + values);
   planes.mean_square = shown_ / samples;
   double left = axes.eigenvalues().sum();

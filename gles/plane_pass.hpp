@@ -145,6 +145,7 @@ class PlanePass {
                                 const PlaneSheets& sheets);
   static std::size_t plane_of(const Group& group, int slot);
   [[nodiscard]] std::string weight_names(std::size_t index, int group, FlatWeights* flat) const;
+  [[nodiscard]] std::string harmonic_names(std::size_t index, FlatWeights* flat) const;
   [[nodiscard]] bool is_raw(const Batch& batch) const {
     return batch.exponent_sheet < 0 && !lookups_ && !batch.predicts;
   }

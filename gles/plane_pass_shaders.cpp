@@ -4,10 +4,15 @@
 #include <cstdio>
 
 #include "gles/plane_pass.hpp"
+#include "gles/prediction.hpp"
 #include "gles/shaders.hpp"
 
 namespace relit::gles {
 namespace {
+
+constexpr const char* kHarmonicNames[kHarmonics] = {"HARMONIC_0", "HARMONIC_1", "HARMONIC_2",
+                                                    "HARMONIC_3", "HARMONIC_4", "HARMONIC_5",
+                                                    "HARMONIC_6", "HARMONIC_7", "HARMONIC_8"};
 
 constexpr const char* kBatchNames[] = {"BATCH_WEIGHTS", "BATCH_PLANES",   "BATCH_MANTISSA",
                                        "BATCH_SHEET_0", "BATCH_SHEET_1",  "BATCH_SHEET_2",
@@ -103,6 +108,21 @@ std::string PlanePass::weight_names(std::size_t index, int group, FlatWeights* f
   return text;
 }
 
+// The same for a prediction's nine.
+std::string PlanePass::harmonic_names(std::size_t index, FlatWeights* flat) const {
+  std::string text;
+  for (std::size_t n = 0; n < kHarmonics; ++n) {
+    const std::string weight = weights_name(index) + "[" + std::to_string(n) + "]";
+    std::string numbers;
+    for (const char channel : {'r', 'g', 'b'}) {
+      const std::string uniform = weight + "." + channel;
+      numbers += (numbers.empty() ? "" : ", ") + (flat != nullptr ? flat->name(uniform) : uniform);
+    }
+    text += define(kHarmonicNames[n], flat != nullptr ? "vec3(" + numbers + ")" : weight);
+  }
+  return text;
+}
+
 std::string PlanePass::weight_declarations(std::span<const int> counts) const {
   std::string text;
   for (std::size_t b = 0; b < batches_.size(); ++b)
@@ -124,8 +144,9 @@ std::string PlanePass::text(PlaneTaps taps, std::span<const int> counts, const P
     text += "vec3 " + name + " {\n  vec3 sum = vec3(0.0);\n  vec2 low, high;\n";
     for (int g = 0; g < counts[b]; ++g) {
       std::string names = define("GROUP", std::to_string(g)), after = undefine("GROUP");
-      if (!batch.predicts) names += weight_names(b, g, flat);
+      names += batch.predicts ? harmonic_names(b, flat) : weight_names(b, g, flat);
       for (const char* each : kWeightNames) after += undefine(each);
+      for (const char* each : kHarmonicNames) after += undefine(each);
       for (int i = 0; i < batch.lookups(); ++i) {
         const std::string place =
             i == batch.planes_per_group ? "PLACE_E" : "PLACE_" + std::to_string(i);
@@ -160,6 +181,8 @@ PlanePass::LookupText PlanePass::lookup_text(const PlaneSheets& sheets) const {
     text.statements += batch_names(b);
     for (int g = 0; g < batch.count(); ++g) {
       std::string names = define("GROUP", std::to_string(g)), after = undefine("GROUP");
+      if (batch.predicts) names += harmonic_names(b, nullptr);
+      for (const char* each : kHarmonicNames) after += undefine(each);
       for (int i = 0; i < batch.lookups(); ++i) {
         const std::string v = "v" + std::to_string(varying++);
         const std::string name =

@@ -1,7 +1,7 @@
   // s * E(N): a plane, and the normal at the texel from three more. The weights are E's nine coefficients with
   // s's factor, of the polynomial below; the first one's fourth number is E_ref. One tap adds colours, four
   // taps add taps: either way four numbers at a time.
-#define PREDICTED(c) (BATCH_WEIGHTS[0].c + BATCH_WEIGHTS[1].c * y + BATCH_WEIGHTS[2].c * z + BATCH_WEIGHTS[3].c * x + BATCH_WEIGHTS[4].c * xy + BATCH_WEIGHTS[5].c * yz + BATCH_WEIGHTS[6].c * zz + BATCH_WEIGHTS[7].c * xz + BATCH_WEIGHTS[8].c * xx)
+#define PREDICTED(c) (HARMONIC_0.c + HARMONIC_1.c * y + HARMONIC_2.c * z + HARMONIC_3.c * x + HARMONIC_4.c * xy + HARMONIC_5.c * yz + HARMONIC_6.c * zz + HARMONIC_7.c * xz + HARMONIC_8.c * xx)
   {
 #ifdef GROUP_UV_0
     float s = BATCH_MANTISSA(SAMPLE_2D(BATCH_SHEET_0, GROUP_UV_0));
