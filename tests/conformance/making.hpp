@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -11,6 +12,8 @@
 
 /// Vectors as changes to a good file, at three depths.
 namespace relit::conformance {
+
+inline constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
 /// What is expected of a vector besides its name.
 struct Expect {

@@ -12,7 +12,6 @@ using namespace container;
 
 namespace {
 
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 /// A vector whose first record of a kind has one bad field.

@@ -12,8 +12,6 @@ using namespace container;
 
 namespace {
 
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-
 /// A change of the first layer of a figure with exponents in blocks of 4.
 void layer(Vectors& vectors, const char* name, const char* description, const char* finding,
            std::function<void(LayerRecord&)> change) {
