@@ -81,7 +81,9 @@ inline constexpr FindingKind kFindingKinds[] = {
 
     {"REF_INVALID", Severity::kError,
      "An id is used twice, a reference leads nowhere, or records contradict each other."},
-    {"REF_LIMIT", Severity::kError, "There are too many records, planes or samples of video."},
+    {"REF_LIMIT", Severity::kError,
+     "There are too many records or planes, samples of video, or vertices, indices and morph "
+     "offsets of all meshes."},
 
     {"SEGM_CORRUPT", Severity::kError, "A field of SEGM breaks a rule."},
     {"SEGM_LIMIT", Severity::kError, "A field of SEGM exceeds a limit."},
@@ -151,7 +153,9 @@ inline constexpr FindingKind kFindingKinds[] = {
     {"VIDEO_EXPONENT", Severity::kWarning,
      "An exponent lies between 0 and the smallest that writers emit."},
     {"VIDEO_TRANSFER", Severity::kInfo,
-     "The mean transfer T_0 of a picture lies outside what passive surfaces can have."},
+     "The mean transfer T_0 of a picture lies outside what passive surfaces can have. Not looked "
+     "at "
+     "where charts lie over one another many times."},
 };
 
 /// An entry of the table, looked up where the program is compiled.

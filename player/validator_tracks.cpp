@@ -207,6 +207,7 @@ std::optional<TrackChecker::Range> TrackChecker::mean_transfer(const Coverage& c
   const std::size_t texels = coverage.mask.size();
   std::vector<double> sums(3 * texels);
   for (std::size_t i = 0; i < sums.size(); ++i) sums[i] = double{model.mean[0][i / texels]};
+  std::int64_t number = 0;
   for (const auto& layer : statics_->layers()) {
     const LayerRecord& record = layer.record;
     if (record.model_id != model.id) continue;
@@ -214,8 +215,16 @@ std::optional<TrackChecker::Range> TrackChecker::mean_transfer(const Coverage& c
     const VideoFrame* exponents =
         record.has_exponents ? &videos_.at(record.exponent_track).first : nullptr;
     if (mantissas.empty() || (exponents != nullptr && exponents->empty())) return std::nullopt;
-    for (const PlaneRecord& plane : record.planes)
-      add_mean(plane, decoders::view_plane(record, plane, mantissas, exponents), model, sums);
+    for (const PlaneRecord& plane : record.planes) {
+      const PlaneView view = decoders::view_plane(record, plane, mantissas, exponents);
+      add_mean(plane, view, model, sums);
+      if (number++ != model.prediction_plane) continue;
+      // s · A_0/π · Y_0, the same for every normal.
+      PlaneRecord predicted = plane;
+      const auto y0 = static_cast<float>(kUnoccluded);
+      predicted.matrix = {{0, 0, y0}, {0, 1, y0}, {0, 2, y0}};
+      add_mean(predicted, view, model, sums);
+    }
   }
   std::optional<Range> range;
   for (std::size_t i = 0; i < sums.size(); ++i) {
