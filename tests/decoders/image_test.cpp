@@ -177,7 +177,9 @@ TEST_CASE("a JPEG of more scans than any encoder writes is refused", "[image]") 
   const auto with_scans = [](std::size_t scans) {
     const Bytes one = make_flat_jpeg({90});
     // Its header and its data.
-    const auto scan = std::ranges::search(one, std::array<std::uint8_t, 2>{0xff, 0xda}).begin();
+    constexpr std::array<std::uint8_t, 2> kScan{0xff, 0xda};
+    // Clang 14 cannot compile the library's ranges::search.
+    const auto scan = std::search(one.begin(), one.end(), kScan.begin(), kScan.end());
     Bytes file(one.begin(), scan);
     for (std::size_t i = 0; i < scans; ++i) file.insert(file.end(), scan, one.end() - 2);
     file.insert(file.end(), {0xff, 0xd9});
