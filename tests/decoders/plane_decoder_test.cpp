@@ -360,8 +360,8 @@ TEST_CASE("pictures that are not shown are passed over, in any order of packets"
     CHECK((*shown)->pts() == static_cast<std::int64_t>(frame));
     CHECK((*shown)->component(0).at(5, 0) == pictures[frame][5]);
   };
-  for (const std::uint64_t frame : {0, 4, 8}) shows(frame);
+  for (const std::uint64_t frame : {0u, 4u, 8u}) shows(frame);
   CHECK(track->pictures() == 3);
   // One that was passed over, and those that follow it.
-  for (const std::uint64_t frame : {5, 8, 0, 11, 4}) shows(frame);
+  for (const std::uint64_t frame : {5u, 8u, 0u, 11u, 4u}) shows(frame);
 }
