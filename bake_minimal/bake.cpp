@@ -62,6 +62,7 @@ class Bake {
   Status find_seams(BakePoser& poser, const TraceGeometry& geometry);
   Status trace();
   Result<BakeSummary> write(const Output& output, bool with_reference);
+  [[nodiscard]] std::vector<std::uint8_t> covered_texels() const;  // [H][W], 1: covered
   Result<PlaneSplit> split_planes(const CodingOptions& coding);
   Result<RateChoice> find_rate(const RangeScan& scan, const ModelIds& ids);
   Result<double> try_rate(RangeScan scan, const ModelIds& ids, double crf);
@@ -262,21 +263,26 @@ Status Bake::write_segments(container::Writer& writer, PlaneEncoder& encoder) {
   return {};
 }
 
+std::vector<std::uint8_t> Bake::covered_texels() const {
+  std::vector<std::uint8_t> covered(texels(), 0);
+  for (const TexelSample& sample : prepared_.samples)
+    covered[sample.texel] = sample.covered ? 1 : 0;
+  return covered;
+}
+
 // Principal planes take a pass of their own over the clip.
 Result<PlaneSplit> Bake::split_planes(const CodingOptions& coding) {
   const TransferShape shape{options_.transfer.order, options_.transfer.width,
                             options_.transfer.height};
   if (coding.planes == Planes::kColour) return PlaneSplit::colour(shape, coding);
-  std::vector<std::uint8_t> known(texels(), 0), counted(texels(), 0);
-  for (const TexelSample& sample : prepared_.samples) {
-    known[sample.texel] = 1;
-    counted[sample.texel] = sample.covered ? 1 : 0;
-  }
+  std::vector<std::uint8_t> known(texels(), 0);
   if (coding.predict) {
     RELIT_ASSIGN(normals_, BakeNormals::create(prepared_, shape.width, shape.height));
     known = normals_->mask();
+  } else {
+    for (const TexelSample& sample : prepared_.samples) known[sample.texel] = 1;
   }
-  PrincipalAnalysis analysis(shape, coding.predict, std::move(counted));
+  PrincipalAnalysis analysis(shape, coding.predict, covered_texels());
   progress_.start("analyse", prepared_.frames, "frame");
   for (std::uint64_t k = 0; k < prepared_.frames; ++k) {
     RELIT_ASSIGN(const TransferFrame frame, fill_frame(k));
@@ -326,11 +332,9 @@ Result<double> Bake::try_rate(RangeScan scan, const ModelIds& ids, double crf) {
         RELIT_TRY(decoder.add_chunk(segment->segment, std::move(chunk)));
     return {};
   };
-  std::vector<std::uint8_t> covered(texels(), 0);
-  for (const TexelSample& sample : prepared_.samples)
-    covered[sample.texel] = sample.covered ? 1 : 0;
   decoders::RelitError error(decoders::standard_lights(),
-                             decoders::coefficient_count(options_.transfer.order), covered);
+                             decoders::coefficient_count(options_.transfer.order),
+                             covered_texels());
   progress_.start("try", 2 * prepared_.frames, "frame");
   for (std::uint64_t k = 0; k < prepared_.frames; ++k) {
     RELIT_ASSIGN(const TransferFrame frame, fill_frame(k));

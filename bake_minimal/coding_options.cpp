@@ -34,6 +34,12 @@ constexpr std::array<CodecTraits, 6> kCodecs = {{
     {"av1", true, false, true, false, 0, 63, 24},
 }};
 
+const CodecTraits* find_codec(std::string_view name) {
+  for (const CodecTraits& codec : kCodecs)
+    if (codec.name == name) return &codec;
+  return nullptr;
+}
+
 Unexpected invalid(std::string message) { return fail(ErrorCode::kInvalid, std::move(message)); }
 
 Status choose_planes(CodingOptions& o, bool only_420) {
@@ -89,8 +95,7 @@ Status check_numbers(const CodingOptions& o, const CodecTraits& codec) {
 }  // namespace
 
 RateRange rate_range(const CodingOptions& o) {
-  const auto codec = std::find_if(kCodecs.begin(), kCodecs.end(),
-                                  [&](const CodecTraits& t) { return t.name == o.codec; });
+  const CodecTraits* const codec = find_codec(o.codec);
   const bool eight_bit_h264 = o.codec == "h264" && *o.bit_depth == 8;
   const bool fine = o.codec == "h264" || o.codec == "hevc";
   return {eight_bit_h264 ? 0 : codec->crf_min, codec->crf_max, fine ? 0.25 : 1};
@@ -108,9 +113,8 @@ CodingOptions paper_options() {
 }
 
 Result<CodingOptions> resolve(CodingOptions o) {
-  const auto codec = std::find_if(kCodecs.begin(), kCodecs.end(),
-                                  [&](const CodecTraits& t) { return t.name == o.codec; });
-  if (codec == kCodecs.end()) {
+  const CodecTraits* const codec = find_codec(o.codec);
+  if (codec == nullptr) {
     return invalid("--codec " + o.codec +
                    " is not known; h264, hevc, mpeg4, ffv1, vp9 and av1 are");
   }
