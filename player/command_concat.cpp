@@ -8,12 +8,12 @@
 namespace relit::player {
 namespace {
 
-struct Arguments {
+struct ConcatArguments {
   std::vector<std::string> sources;
   std::string output;
 };
 
-Status join(const Arguments& arguments) {
+Status join(const ConcatArguments& arguments) {
   if (std::ranges::count(arguments.sources, "-") > 1)
     return fail(ErrorCode::kInvalid, "concat: standard input can be read only once");
   std::vector<RewriteSource> sources;
@@ -26,7 +26,7 @@ Status join(const Arguments& arguments) {
   return sink->commit();
 }
 
-int run(const Arguments& arguments) {
+int run_concat(const ConcatArguments& arguments) {
   const Status joined = join(arguments);
   return joined ? kSuccess : report(joined.error());
 }
@@ -36,14 +36,14 @@ int run(const Arguments& arguments) {
 void add_concat(CommandLine& line) {
   Options command =
       line.add("concat", "join files of one character into one file with all their clips");
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<ConcatArguments>();
   command.add("sources", arguments->sources, "paths, - or http(s)://").required().expected(2, 1024);
   command.add("-o,--output", arguments->output, "the new file").required();
   command.footer(
       "Meshes, materials, images and skeleton must be the same; nothing is encoded again.\n"
       "Clips whose name is taken get \" 2\", \" 3\", ...\n"
       "Example:\n  relit concat walk.relit turn.relit walk.relit -o scene.relit");
-  command.runs([arguments] { return run(*arguments); });
+  command.runs([arguments] { return run_concat(*arguments); });
 }
 
 }  // namespace relit::player

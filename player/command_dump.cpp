@@ -11,7 +11,7 @@ namespace {
 
 using decoders::NpyWriter;
 
-struct Arguments {
+struct DumpArguments {
   SourceArguments source;
   std::string output, mask, clip, frame, frames;
   int layers = -1;
@@ -30,7 +30,7 @@ Status write_mask(const ClipReader& clip, const std::string& path) {
   return writer.commit();
 }
 
-Status write_frames(ClipReader& clip, const Arguments& arguments) {
+Status write_frames(ClipReader& clip, const DumpArguments& arguments) {
   const bool several = !arguments.frames.empty();
   RELIT_ASSIGN(const FrameRange range,
                parse_frames(several                   ? arguments.frames
@@ -62,7 +62,7 @@ Status write_frames(ClipReader& clip, const Arguments& arguments) {
   return writer.commit();
 }
 
-int run(const Arguments& arguments) {
+int run_dump(const DumpArguments& arguments) {
   if (arguments.output.empty() && arguments.mask.empty()) {
     return report(
         {ErrorCode::kInvalid, "dump: nothing to write; name -o X.npy, --mask M.npy or both"});
@@ -87,7 +87,7 @@ int run(const Arguments& arguments) {
 
 void add_dump(CommandLine& line) {
   Options command = line.add("dump", "write decoded transfer coefficients as NumPy arrays");
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<DumpArguments>();
   add_source_options(command, arguments->source, "path, - or http(s)://");
   Option frame =
       command.add("--frame", arguments->frame, "one frame: float32 [coefficients][3][H][W]");
@@ -100,7 +100,7 @@ void add_dump(CommandLine& line) {
               "only the first so many layers; what they lack is zero");
   command.add("--threads", arguments->threads, "of each decoder").range(1, 64);
   command.footer("Example:\n  relit dump man.relit --frames 0-99 -o man.npy --mask mask.npy");
-  command.runs([arguments] { return run(*arguments); });
+  command.runs([arguments] { return run_dump(*arguments); });
 }
 
 }  // namespace relit::player

@@ -12,14 +12,15 @@
 namespace relit::player {
 namespace {
 
-struct Arguments {
+struct ExportArguments {
   std::string source, output, clip;
 };
 
 /// One clip's way into a Matroska file.
 class Export {
  public:
-  static Result<Export> begin(const container::FileContents& contents, const Arguments& arguments);
+  static Result<Export> begin(const container::FileContents& contents,
+                              const ExportArguments& arguments);
 
   /// Errors: the output's; kUnsupported where frames are too short for Matroska.
   Status take(const container::Record& record);
@@ -41,7 +42,8 @@ class Export {
   std::uint64_t packets_ = 0;
 };
 
-Result<Export> Export::begin(const container::FileContents& contents, const Arguments& arguments) {
+Result<Export> Export::begin(const container::FileContents& contents,
+                             const ExportArguments& arguments) {
   RELIT_ASSIGN(const container::ClipRecord* clip,
                find_clip(contents, arguments.clip, arguments.source));
   std::vector<VideoTrack> tracks = video_tracks(contents, clip->id);
@@ -126,7 +128,7 @@ Result<std::string> write_segments(container::Reader& reader, Export& output) {
   return damage;
 }
 
-int run(const Arguments& arguments) {
+int run_export(const ExportArguments& arguments) {
   auto source = open_source(arguments.source);
   if (!source) return report(source.error());
   auto reader = container::Reader::open(std::move(*source));
@@ -151,14 +153,14 @@ int run(const Arguments& arguments) {
 
 void add_export(CommandLine& line) {
   Options command = line.add("export", "write the video tracks of a clip as a Matroska file");
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<ExportArguments>();
   command.add("source", arguments->source, "path, - or http(s)://").required();
   command.add("-o,--output", arguments->output, "the .mkv file").required();
   command.add("--clip", arguments->clip, "by name or number");
   command.footer(
       "Every stream's tag RELIT_TRACK is the number of its track; packets are copied as they are.\n"
       "Example:\n  relit export man.relit -o man.mkv && ffprobe man.mkv");
-  command.runs([arguments] { return run(*arguments); });
+  command.runs([arguments] { return run_export(*arguments); });
 }
 
 }  // namespace relit::player

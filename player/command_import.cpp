@@ -17,13 +17,13 @@ namespace {
 
 using container::FileContents;
 
-struct Arguments {
+struct ImportArguments {
   std::string source, matroska, output;
 };
 
 /// Finds the clip whose tracks the Matroska file holds; all have to be of one.
 Result<const container::ClipRecord*> clip_of(const FileContents& contents, const PacketFeed& feed,
-                                             const Arguments& a) {
+                                             const ImportArguments& a) {
   if (feed.tracks().empty()) {
     return fail(ErrorCode::kCorrupt,
                 a.matroska + ": no stream has a tag RELIT_TRACK, as `relit export` writes it");
@@ -183,7 +183,7 @@ Status Import::flush(container::Writer& writer) {
   return fail(ErrorCode::kCorrupt, name + ": " + written.error().message);
 }
 
-Status import_file(const Arguments& a) {
+Status import_file(const ImportArguments& a) {
   RELIT_ASSIGN(auto source, open_source(a.source));
   const auto in_source = [&](const Error& error) {
     return fail(error.code, a.source + ": " + error.message);
@@ -204,7 +204,7 @@ Status import_file(const Arguments& a) {
   return {};
 }
 
-int run(const Arguments& arguments) {
+int run_import(const ImportArguments& arguments) {
   const Status status = import_file(arguments);
   return status ? kSuccess : report(status.error());
 }
@@ -213,7 +213,7 @@ int run(const Arguments& arguments) {
 
 void add_import(CommandLine& line) {
   Options command = line.add("import", "put the video tracks of a Matroska file back into a clip");
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<ImportArguments>();
   command.add("source", arguments->source, "the .relit file: path, - or http(s)://").required();
   command.add("matroska", arguments->matroska, "as `relit export` wrote it, or remuxed").required();
   command.add("-o,--output", arguments->output, "the new .relit file").required();
@@ -222,7 +222,7 @@ void add_import(CommandLine& line) {
       "every\n"
       "one has to begin with a key frame. Records that this version does not know are left out.\n"
       "Example:\n  relit import man.relit man.mkv -o new.relit");
-  command.runs([arguments] { return run(*arguments); });
+  command.runs([arguments] { return run_import(*arguments); });
 }
 
 }  // namespace relit::player

@@ -8,12 +8,12 @@
 namespace relit::player {
 namespace {
 
-struct Arguments {
+struct InfoArguments {
   SourceArguments source;
   bool json = false;
 };
 
-Result<FileSurvey> survey(const Arguments& arguments) {
+Result<FileSurvey> survey(const InfoArguments& arguments) {
   RELIT_ASSIGN(auto source, open_source(arguments.source, !arguments.json));
   auto found = survey_file(std::move(source), arguments.json);
   if (!found) return fail(found.error().code, arguments.source.name + ": " + found.error().message);
@@ -70,7 +70,7 @@ void print(const FileSurvey& s, const std::string& name) {
   }
 }
 
-int run(const Arguments& arguments) {
+int run_info(const InfoArguments& arguments) {
   const Result<FileSurvey> found = survey(arguments);
   if (!found) return report(found.error());
   if (arguments.json) {
@@ -90,10 +90,10 @@ int run(const Arguments& arguments) {
 
 void add_info(CommandLine& line) {
   Options command = line.add("info", "say what a file holds");
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<InfoArguments>();
   add_source_options(command, arguments->source, "path, - or http(s)://");
   command.flag("--json", arguments->json, "as JSON, to standard output");
-  command.runs([arguments] { return run(*arguments); });
+  command.runs([arguments] { return run_info(*arguments); });
 }
 
 }  // namespace relit::player

@@ -7,7 +7,7 @@
 namespace relit::player {
 namespace {
 
-struct Arguments {
+struct ProjectArguments {
   LightArguments light;
   std::vector<std::string> environments;
   std::vector<double> times_s;
@@ -18,7 +18,7 @@ struct Arguments {
 };
 
 // One light, or one for each time.
-Result<LightField> make_field(const Arguments& arguments) {
+Result<LightField> make_field(const ProjectArguments& arguments) {
   if (arguments.times_s.size() != arguments.environments.size() &&
       !(arguments.times_s.empty() && arguments.environments.size() == 1)) {
     return fail(ErrorCode::kInvalid, std::to_string(arguments.environments.size()) +
@@ -42,7 +42,7 @@ Result<LightField> make_field(const Arguments& arguments) {
   return LightField::create(std::move(parts));
 }
 
-int run(const Arguments& arguments) {
+int run_light(const ProjectArguments& arguments) {
   const auto field = make_field(arguments);
   if (!field) return report(field.error());
   if (const Status status = write_light_json(arguments.output, *field); !status)
@@ -60,7 +60,7 @@ int run(const Arguments& arguments) {
 void add_light(CommandLine& line) {
   Options command =
       line.add("light", "project an environment map to spherical harmonics, for devices");
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<ProjectArguments>();
   command
       .add("environment", arguments->environments,
            ".hdr or .exr (equirectangular), or .json; several with --times")
@@ -80,7 +80,7 @@ void add_light(CommandLine& line) {
       "Examples:\n"
       "  relit light sky.hdr -o sky.json --rotate-light 90 --light-window\n"
       "  relit light dawn.hdr noon.hdr dusk.hdr --times 0,4,8 -o day.json");
-  command.runs([arguments] { return run(*arguments); });
+  command.runs([arguments] { return run_light(*arguments); });
 }
 
 }  // namespace relit::player

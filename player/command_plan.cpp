@@ -14,7 +14,7 @@
 namespace relit::player {
 namespace {
 
-struct Arguments {
+struct PlanArguments {
   SourceArguments source;
   MemoryWishes wishes;
   std::string budget, path = "auto", size = "1280x720";
@@ -29,7 +29,7 @@ std::uint64_t machine_bytes() {
   return static_cast<std::uint64_t>(pages) * static_cast<std::uint64_t>(page);
 }
 
-Status complete(Arguments& arguments) {
+Status complete(PlanArguments& arguments) {
   RELIT_ASSIGN(arguments.wishes.path, parse_composite_path(arguments.path));
   if (arguments.headless) return {};
   DrawingScale& drawing = arguments.wishes.drawing.emplace();
@@ -50,7 +50,7 @@ struct Loaded {
   SegmentScale segments;
 };
 
-Result<Loaded> load(const Arguments& arguments) {
+Result<Loaded> load(const PlanArguments& arguments) {
   RELIT_ASSIGN(auto source, open_source(arguments.source, true));
   container::ReaderOptions options;
   options.sparing = true;
@@ -113,7 +113,7 @@ void print(const MemoryPlan& plan, bool headless) {
   for (const std::string& sentence : plan.given_up) std::printf("given up: %s\n", sentence.c_str());
 }
 
-int refuse(const Arguments& arguments, const Loaded& loaded, const Error& error) {
+int refuse(const PlanArguments& arguments, const Loaded& loaded, const Error& error) {
   const auto smallest = smallest_budget(loaded.contents, loaded.segments, arguments.wishes);
   if (arguments.json && smallest) {
     nlohmann::ordered_json json;
@@ -125,7 +125,7 @@ int refuse(const Arguments& arguments, const Loaded& loaded, const Error& error)
   return kBadInput;
 }
 
-int run(Arguments arguments) {
+int run_plan(PlanArguments arguments) {
   if (const Status status = complete(arguments); !status) return report(status.error());
   std::optional<std::uint64_t> budget;
   if (!arguments.budget.empty()) {
@@ -156,7 +156,7 @@ int run(Arguments arguments) {
 
 void add_plan(CommandLine& line) {
   Options command = line.add("plan", "say what memory playing a file takes");
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<PlanArguments>();
   add_source_options(command, arguments->source, "path, - or http(s)://");
   command.add("--memory-budget", arguments->budget,
               "bytes of heap and GPU together, such as 32MiB; as much as the machine has");
@@ -181,7 +181,7 @@ void add_plan(CommandLine& line) {
   command.footer(
       "What does not fit is given up in this order: frames ahead, threads, the choice of composite "
       "path, the light map's precision, layers.\nExit status: 1 if no plan fits.");
-  command.runs([arguments] { return run(*arguments); });
+  command.runs([arguments] { return run_plan(*arguments); });
 }
 
 }  // namespace relit::player

@@ -8,7 +8,7 @@
 namespace relit::player {
 namespace {
 
-struct Arguments {
+struct PlayArguments {
   SourceArguments source;
   std::string clips, camera, quality = "auto", composite = "auto", memory_budget;
   std::vector<std::string> lights;
@@ -28,7 +28,7 @@ Result<std::optional<double>> parse_quality(const std::string& text) {
   return fail(ErrorCode::kInvalid, "--quality " + text + ": it must be auto, or from 0 to 1");
 }
 
-Status read_player_options(const Arguments& arguments, WindowOptions& window) {
+Status read_player_options(const PlayArguments& arguments, WindowOptions& window) {
   PlayerOptions& player = window.player;
   RELIT_ASSIGN(player.path, parse_composite_path(arguments.composite));
   RELIT_ASSIGN(player.governor.quality, parse_quality(arguments.quality));
@@ -43,7 +43,7 @@ Status read_player_options(const Arguments& arguments, WindowOptions& window) {
   return {};
 }
 
-Result<WindowOptions> window_options(const Arguments& arguments) {
+Result<WindowOptions> window_options(const PlayArguments& arguments) {
   WindowOptions window = arguments.window;
   window.source = arguments.source.name;
   window.reading.http_headers = arguments.source.http_headers;
@@ -68,7 +68,7 @@ Result<WindowOptions> window_options(const Arguments& arguments) {
   return window;
 }
 
-int run(const Arguments& arguments) {
+int run_play(const PlayArguments& arguments) {
   const auto window = window_options(arguments);
   if (!window) return report(window.error());
   const auto loss = play_in_window(*window);
@@ -76,7 +76,7 @@ int run(const Arguments& arguments) {
   return report_loss(*loss);
 }
 
-void add_playback_options(Options command, Arguments& a) {
+void add_playback_options(Options command, PlayArguments& a) {
   command.add("--clip", a.clips, "by name or number; several, with commas between, are a sequence");
   command
       .add("--cross-fade", a.window.cross_fade_s,
@@ -94,7 +94,7 @@ void add_playback_options(Options command, Arguments& a) {
                "show frames as they are, and nothing in between");
 }
 
-void add_cost_options(Options command, Arguments& a) {
+void add_cost_options(Options command, PlayArguments& a) {
   command
       .add("--target-fps", a.window.player.governor.target_fps,
            "pictures a second that the quality is chosen for")
@@ -116,7 +116,7 @@ void add_cost_options(Options command, Arguments& a) {
 
 void add_play(CommandLine& line) {
   Options command = line.add("play", "play a clip in a window");
-  const auto a = std::make_shared<Arguments>();
+  const auto a = std::make_shared<PlayArguments>();
   add_source_options(command, a->source, "path, - or http(s)://; a pipe cannot loop");
   command
       .add("--light", a->lights, ".hdr, .exr (equirectangular) or .json; several are taken in turn")
@@ -140,7 +140,7 @@ void add_play(CommandLine& line) {
   command.flag("--es2", a->window.es2, "take OpenGL ES 2");
   command.add("--pictures", a->window.max_shown, "leave after so many pictures");
   command.footer(window_help());
-  command.runs([a] { return run(*a); });
+  command.runs([a] { return run_play(*a); });
 }
 
 }  // namespace relit::player

@@ -11,7 +11,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-struct Arguments {
+struct RecoverArguments {
   std::string source, output;
   bool json = false;
 };
@@ -73,7 +73,7 @@ void print(const RecoverReport& report, const std::string& name) {
       " bytes damaged");
 }
 
-Result<RecoverReport> recover_file(const Arguments& arguments) {
+Result<RecoverReport> recover_file(const RecoverArguments& arguments) {
   RELIT_ASSIGN(const auto source, open_source(arguments.source));
   if (!source->seekable() || !source->size())
     return fail(ErrorCode::kInvalid,
@@ -85,7 +85,7 @@ Result<RecoverReport> recover_file(const Arguments& arguments) {
   return report;
 }
 
-int run(const Arguments& arguments) {
+int run_recover(const RecoverArguments& arguments) {
   const auto report_of = recover_file(arguments);
   if (!report_of) return report(report_of.error());
   print(*report_of, arguments.source);
@@ -102,7 +102,7 @@ int run(const Arguments& arguments) {
 void add_recover(CommandLine& line) {
   Options command =
       line.add("recover", "write what is left of a damaged or cut file as a complete one");
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<RecoverArguments>();
   command.add("source", arguments->source, "the damaged file").required();
   command.add("output", arguments->output, "the new file").required();
   command.flag("--json", arguments->json, "say what happened as JSON, to standard output");
@@ -115,7 +115,7 @@ void add_recover(CommandLine& line) {
       "  \"tracks\": [{\"clip\": id, \"clip_name\", \"track\": id, \"what\": \"pose\" | \"layer "
       "ID\" | \"exponents of layer ID\", \"missing_frames\": [[first, last], ...]}]}\n"
       "missing_frames are the frames of the clip that the new file lacks in that track.");
-  command.runs([arguments] { return run(*arguments); });
+  command.runs([arguments] { return run_recover(*arguments); });
 }
 
 }  // namespace relit::player

@@ -7,7 +7,7 @@
 namespace relit::player {
 namespace {
 
-struct Arguments {
+struct RemuxArguments {
   std::string source, output, frames;
   RemuxOptions options;
   std::size_t layers = 0;
@@ -15,7 +15,7 @@ struct Arguments {
   bool has_layers = false, has_from = false, has_to = false, no_copies = false;
 };
 
-Result<RemuxOptions> options_of(const Arguments& arguments) {
+Result<RemuxOptions> options_of(const RemuxArguments& arguments) {
   RemuxOptions options = arguments.options;
   options.copies = !arguments.no_copies;
   if (arguments.has_layers) options.layers = arguments.layers;
@@ -32,7 +32,7 @@ Result<RemuxOptions> options_of(const Arguments& arguments) {
   return options;
 }
 
-Result<RemuxReport> remux_file(const Arguments& arguments) {
+Result<RemuxReport> remux_file(const RemuxArguments& arguments) {
   RELIT_ASSIGN(const RemuxOptions options, options_of(arguments));
   RELIT_ASSIGN(RewriteSource source, open_rewrite(arguments.source));
   RELIT_ASSIGN(const auto sink, container::FileSink::create(arguments.output));
@@ -42,7 +42,7 @@ Result<RemuxReport> remux_file(const Arguments& arguments) {
   return done;
 }
 
-int run(const Arguments& arguments) {
+int run_remux(const RemuxArguments& arguments) {
   const auto done = remux_file(arguments);
   if (!done) return report(done.error());
   if (done->kept_frames)
@@ -56,7 +56,7 @@ int run(const Arguments& arguments) {
 
 void add_remux(CommandLine& line) {
   Options command = line.add("remux", "write parts of a file as a file of their own, as they are");
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<RemuxArguments>();
   command.add("source", arguments->source, "path, - or http(s)://").required();
   command.add("output", arguments->output, "the new file").required();
   command
@@ -84,7 +84,7 @@ void add_remux(CommandLine& line) {
     arguments->has_layers = layers.given();
     arguments->has_from = from.given();
     arguments->has_to = to.given();
-    return run(*arguments);
+    return run_remux(*arguments);
   });
 }
 

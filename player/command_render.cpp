@@ -13,7 +13,7 @@
 namespace relit::player {
 namespace {
 
-struct Arguments {
+struct RenderArguments {
   SourceArguments source;
   std::string output, clip, frame, frames, camera, sheet, backend = "egl", composite,
                                                           size = "512x512";
@@ -47,7 +47,8 @@ Result<Size> parse_size(const std::string& text, const char* option, int largest
 
 // The frames that are asked for, as far as the clip's record says; by a time, and unevenly spaced,
 // it may be any.
-Result<FrameRange> chosen_frames(const Arguments& arguments, const container::ClipRecord& clip) {
+Result<FrameRange> chosen_frames(const RenderArguments& arguments,
+                                 const container::ClipRecord& clip) {
   if (!arguments.frames.empty())
     return parse_frames(arguments.frames, "--frames", clip.frame_count);
   if (!arguments.frame.empty()) return parse_frames(arguments.frame, "--frame", clip.frame_count);
@@ -74,7 +75,7 @@ Result<FrameRange> chosen_frames(const Arguments& arguments, const container::Cl
 }
 
 // As asked for, by --composite or else by the backend.
-Result<CompositePath> chosen_path(const Arguments& arguments, Backend backend) {
+Result<CompositePath> chosen_path(const RenderArguments& arguments, Backend backend) {
   if (!arguments.composite.empty()) return parse_composite_path(arguments.composite);
   return backend == Backend::kCpu ? CompositePath::kCpu : CompositePath::kTexture;
 }
@@ -82,7 +83,7 @@ Result<CompositePath> chosen_path(const Arguments& arguments, Backend backend) {
 // A player of the frames that were asked for, under the light. Time moves by show() alone.
 class Frames {
  public:
-  static Result<Frames> open(const Arguments& arguments) {
+  static Result<Frames> open(const RenderArguments& arguments) {
     Frames frames;
     RELIT_ASSIGN(const Backend backend, parse_backend(arguments.backend));
     RELIT_ASSIGN(const CompositePath path, chosen_path(arguments, backend));
@@ -113,7 +114,7 @@ class Frames {
  private:
   static constexpr double kPatience_s = 60;
 
-  Status open_player(const Arguments& arguments, CompositePath path) {
+  Status open_player(const RenderArguments& arguments, CompositePath path) {
     PlayerOptions options;
     options.name = source_name(arguments.source.name);
     options.clip = arguments.clip;
@@ -149,7 +150,7 @@ class Frames {
   }
 };
 
-Status render_lightmap(const Arguments& arguments, Frames& frames) {
+Status render_lightmap(const RenderArguments& arguments, Frames& frames) {
   const FrameRange& range = frames.range;
   const Player::Size size = frames.player->light_map_size();
   std::vector<std::uint64_t> shape{3, static_cast<std::uint64_t>(size.height),
@@ -171,7 +172,7 @@ Status render_lightmap(const Arguments& arguments, Frames& frames) {
 // Frames as pictures, off the screen.
 class PictureRenderer {
  public:
-  static Result<PictureRenderer> create(const Arguments& arguments, const Frames& frames,
+  static Result<PictureRenderer> create(const RenderArguments& arguments, const Frames& frames,
                                         const Look& look, Size size) {
     OrbitCamera camera;
     if (!arguments.camera.empty()) {
@@ -206,8 +207,8 @@ class PictureRenderer {
 };
 
 // Pictures side by side in one.
-Status render_sheet(const Arguments& arguments, PictureRenderer& renderer, const FrameRange& range,
-                    Size size) {
+Status render_sheet(const RenderArguments& arguments, PictureRenderer& renderer,
+                    const FrameRange& range, Size size) {
   RELIT_ASSIGN(const Size cells, parse_size(arguments.sheet, "--sheet", 64));
   PictureWriter::Options options;
   options.path = arguments.output;
@@ -237,7 +238,7 @@ Status render_sheet(const Arguments& arguments, PictureRenderer& renderer, const
   return writer->finish();
 }
 
-Status render_pictures(const Arguments& arguments, const Frames& frames, const Look& look) {
+Status render_pictures(const RenderArguments& arguments, const Frames& frames, const Look& look) {
   RELIT_ASSIGN(const Size size, parse_size(arguments.size, "--size", 8192));
   RELIT_ASSIGN(PictureRenderer renderer, PictureRenderer::create(arguments, frames, look, size));
   const FrameRange& range = frames.range;
@@ -257,7 +258,7 @@ Status render_pictures(const Arguments& arguments, const Frames& frames, const L
   return writer->finish();
 }
 
-Result<PlaybackLoss> render(const Arguments& arguments) {
+Result<PlaybackLoss> render(const RenderArguments& arguments) {
   RELIT_ASSIGN(const Look look, parse_look(arguments.look));
   RELIT_ASSIGN(Frames frames, Frames::open(arguments));
   RELIT_TRY(arguments.lightmap ? render_lightmap(arguments, frames)
@@ -265,7 +266,7 @@ Result<PlaybackLoss> render(const Arguments& arguments) {
   return frames.player->stats().loss;
 }
 
-int run(const Arguments& arguments) {
+int run_render(const RenderArguments& arguments) {
   const auto loss = render(arguments);
   return loss ? report_loss(*loss) : report(loss.error());
 }
@@ -281,7 +282,7 @@ constexpr const char* kExamples = R"(Examples:
 void add_render(CommandLine& line) {
   Options command =
       line.add("render", "relight a clip: pictures, films, contact sheets or the light map itself");
-  const auto a = std::make_shared<Arguments>();
+  const auto a = std::make_shared<RenderArguments>();
   add_source_options(command, a->source, "path, - or http(s)://");
   command.add("--light", a->light.path, ".hdr, .exr (equirectangular) or .json").required();
   add_light_options(command, a->light);
@@ -315,7 +316,7 @@ void add_render(CommandLine& line) {
   command.add("--sheet", a->sheet, "COLUMNSxROWS: a contact sheet of evenly spaced frames");
   command.flag("--lightmap", a->lightmap, "write the composite, float32 [3][H][W], not clamped");
   command.footer(kExamples);
-  command.runs([a] { return run(*a); });
+  command.runs([a] { return run_render(*a); });
 }
 
 }  // namespace relit::player

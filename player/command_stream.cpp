@@ -19,7 +19,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-struct Arguments {
+struct StreamArguments {
   SourceArguments source;
   std::string clip, decoder, sink = "planes";
   LightArguments light;
@@ -72,7 +72,7 @@ Result<SegmentScale> measure_segments(const SourceArguments& source,
 }
 
 /// What fits into --memory-budget; nothing where none was given.
-Result<std::optional<MemoryPlan>> plan_within(const Arguments& arguments,
+Result<std::optional<MemoryPlan>> plan_within(const StreamArguments& arguments,
                                               const ClipDemuxer& demuxer) {
   if (arguments.memory_budget.empty()) return std::optional<MemoryPlan>();
   auto budget = parse_bytes(arguments.memory_budget);
@@ -112,7 +112,7 @@ class Lateness {
 
 class Stream {
  public:
-  static Result<Stream> open(const Arguments& arguments);
+  static Result<Stream> open(const StreamArguments& arguments);
   /// Plays until the end, or as long as was asked for.
   Status play();
   void print_json() const;
@@ -120,7 +120,7 @@ class Stream {
   [[nodiscard]] PlaybackLoss loss() const { return clip_->loss(); }
 
  private:
-  explicit Stream(const Arguments& arguments) : arguments_(arguments) {
+  explicit Stream(const StreamArguments& arguments) : arguments_(arguments) {
     if (arguments.realtime) lateness_.expect(1 << 16);
   }
   Status show(std::uint64_t index);
@@ -132,7 +132,7 @@ class Stream {
     return arguments_.seconds > 0 && seconds_since(began_) >= arguments_.seconds;
   }
 
-  Arguments arguments_;
+  StreamArguments arguments_;
   Clock::time_point began_ = Clock::now();
   std::optional<MemoryPlan> plan_;
   std::unique_ptr<Prefetcher> clip_;
@@ -144,7 +144,7 @@ class Stream {
   std::uint64_t frames_ = 0, late_ = 0, dropped_ = 0;
 };
 
-Result<Stream> Stream::open(const Arguments& arguments) {
+Result<Stream> Stream::open(const StreamArguments& arguments) {
   Stream stream(arguments);
   const auto interrupt = std::make_shared<Interrupt>();
   SourceOptions reading;
@@ -354,7 +354,7 @@ void Stream::print_json() const {
   std::printf("%s\n", out.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
 }
 
-int run(const Arguments& arguments) {
+int run_stream(const StreamArguments& arguments) {
   if (arguments.sink == "composite" && arguments.light.path.empty()) {
     return report({ErrorCode::kInvalid, "stream --sink composite needs a --light"});
   }
@@ -374,7 +374,7 @@ int run(const Arguments& arguments) {
 
 void add_stream(CommandLine& line) {
   Options command = line.add("stream", "play a clip without a window, and tell how it went");
-  const auto a = std::make_shared<Arguments>();
+  const auto a = std::make_shared<StreamArguments>();
   add_source_options(command, a->source, "path, - or http(s)://; a pipe cannot loop");
   command.add("--clip", a->clip, "by name or number");
   command.add("--layers", a->layers, "only the first so many layers");
@@ -415,7 +415,7 @@ void add_stream(CommandLine& line) {
     if (a->loops == 0 && !(a->seconds > 0)) {
       return report({ErrorCode::kInvalid, "stream --loops 0 needs --seconds"});
     }
-    return run(*a);
+    return run_stream(*a);
   });
 }
 

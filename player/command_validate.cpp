@@ -13,7 +13,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-struct Arguments {
+struct ValidateArguments {
   std::vector<std::string> sources;
   bool json = false;
   bool warnings_as_errors = false;
@@ -50,7 +50,7 @@ Result<std::vector<std::string>> expand(const std::vector<std::string>& sources)
   return files;
 }
 
-Result<ValidationReport> examine(const std::string& file, const Arguments& arguments) {
+Result<ValidationReport> examine(const std::string& file, const ValidateArguments& arguments) {
   RELIT_ASSIGN(auto source, open_source(file));
   ValidationOptions options;
   options.threads = arguments.threads;
@@ -90,7 +90,7 @@ void print(const std::string& file, const ValidationReport& report) {
                 static_cast<unsigned long long>(met - report.findings.size()));
 }
 
-int run(const Arguments& arguments) {
+int run_validate(const ValidateArguments& arguments) {
   const auto files = expand(arguments.sources);
   if (!files) return report(files.error());
   Totals totals;
@@ -129,7 +129,7 @@ int run(const Arguments& arguments) {
 void add_validate(CommandLine& line) {
   Options command = line.add(
       "validate", "check that files keep every rule of the format, and that all of them decodes");
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<ValidateArguments>();
   command
       .add("files", arguments->sources, "paths, - or http(s)://; of a folder, all *.relit below it")
       .required();
@@ -138,7 +138,7 @@ void add_validate(CommandLine& line) {
                "a file with warnings is not valid");
   command.add("--threads", arguments->threads, "of each decoder").range(1, 64);
   command.footer("container/VALIDATION.md lists what can be found.");
-  command.runs([arguments] { return run(*arguments); });
+  command.runs([arguments] { return run_validate(*arguments); });
 }
 
 }  // namespace relit::player

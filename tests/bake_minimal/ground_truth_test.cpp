@@ -185,11 +185,15 @@ std::filesystem::path own_character() { return test::binary_dir() / "media/manne
 
 }  // namespace
 
-TEST_CASE("direct light on the mannequin agrees with random paths") { check(own_character(), 0); }
+TEST_CASE("direct light on the mannequin agrees with random paths", "[long]") {
+  check(own_character(), 0);
+}
 
-TEST_CASE("one bounce on the mannequin agrees with random paths") { check(own_character(), 1); }
+TEST_CASE("one bounce on the mannequin agrees with random paths", "[long]") {
+  check(own_character(), 1);
+}
 
-TEST_CASE("one bounce on CesiumMan agrees with random paths") {
+TEST_CASE("one bounce on CesiumMan agrees with random paths", "[long]") {
   const auto file = test::shared_asset("CesiumMan.glb");
   if (file) check(*file, 1);
 }

@@ -18,12 +18,11 @@ ORDER = ["HEAD", *STATIC, "SEGM", "INDX", "FEND"]
 class Refuse(ValueError):
     """The file, or a part of it, must not be used."""
 
-class Framing(Refuse):
-    """The framing is lost at this place."""
+class Framing(Refuse): """The framing is lost at this place."""
 
 def signed(zigzag): return zigzag >> 1 ^ -(zigzag & 1)
 def affine(offset, step, integers): return [o + k * i for o, k, i in zip(offset, step, integers)]
-def distinct(values): return len(set(values)) == len(values)
+def distinct(values): return len(set(values := list(values))) == len(values)
 
 def need(condition, what, error=Refuse):
     if not condition: raise error(what)
@@ -165,18 +164,19 @@ def check_references(s):
         need(all(r[field] in ids for t in s for r in s[t] if field in r), f"no such {field}")
     skeleton = s["skeleton"] = [*s["skeleton"], {"morph_weights": 0, "nodes": [], "palette": []}][0]
     nodes, weights = len(skeleton["nodes"]), skeleton["morph_weights"]
+    had = [(n := m["vertices"], m["index_count"], n * len(m["morph_targets"])) for m in s["meshes"]]
+    need(all(sum(n) <= 1 << e for n, e in zip(zip(*had), (22, 25, 26))), "meshes")
     for m in s["meshes"]:
         m["triangles"] = m["index_count"] // 3
         joints, targets = any(x["semantic"] == "joints" for x in m["streams"]), m["morph_targets"]
-        need(skeleton["palette"] or not joints, "no palette")
-        need(not targets or m["first_morph_weight"] + len(targets) <= weights, "no such weight")
+        need((skeleton["palette"] or not joints) and (not targets or m["first_morph_weight"]
+             + len(targets) <= weights), "no palette, or no such weight")
     for p in s["poses"]:
         need(all(r["node"] < nodes for r in p["rest"]), "a node that is not there")
         need(all(c["index"] < (weights if c["target"] == "morph_weight" else nodes)
                  for c in p["channels"]), "a channel of what is not there")
         ranges = [r["mesh"] for r in p["vertex_ranges"]]
         need(p["kind"] == "joints" or ranges == [m["id"] for m in s["meshes"]], "vertex ranges")
-    need(distinct([p["clip"] for p in s["poses"]]), "two POSE of a clip")
     for m in s["models"]:
         m["layers"] = [layer for layer in s["layers"] if layer["model"] == m["id"]]
         planes = [p for layer in m["layers"] for p in layer["planes"]]
@@ -192,7 +192,7 @@ def check_references(s):
         num, den = clip["tick_rate"]
         clip["duration_s"] = clip["duration_ticks"] * den / num
         need(total <= 1 << 48 and total * num <= clip["duration_ticks"] * den << 33, "samples")
-    need(distinct([track for track, _ in tracks]), "two users of a track")
+    need(distinct(p["clip"] for p in s["poses"]) and distinct(t for t, _ in tracks), "two users")
     return dict(tracks)
 
 # The file, sections 1 and 2 -----------------------------------------------------------------------

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Records that contradict each other.
+#include "container/base/limits.hpp"
 #include "container/record_codec.hpp"
 #include "tests/conformance/making.hpp"
 
@@ -91,6 +92,26 @@ void add_dangling(Vectors& vectors) {
   from_static_draft(vectors, "video-samples-limit",
                     "more samples of video than any machine decodes", "REF_LIMIT",
                     [](Draft& d) { d.clips[0].tick_rate.num = 0x7FFFFFFF; });
+  // What one mesh may have, too often. The streams hold less, which a decoder would also see.
+  const auto meshes = [&](const char* name, const char* description, std::uint32_t count,
+                          const std::function<void(MeshRecord&)>& enlarge) {
+    from_static_draft(vectors, name, description, "REF_LIMIT", [=](Draft& d) {
+      enlarge(d.meshes[0]);
+      for (std::uint32_t id = 1; id < count; ++id) {
+        d.meshes.push_back(d.meshes[0]);
+        d.meshes.back().id = 1000 + id;
+      }
+    });
+    vectors.back().findings.push_back("DECODE_MESH");
+  };
+  meshes("meshes-vertices-limit", "more than 2^22 vertices in all", 65,
+         [](MeshRecord& m) { m.vertex_count = limits::kVerticesPerMesh; });
+  meshes("meshes-indices-limit", "more than 2^25 indices in all", 11,
+         [](MeshRecord& m) { m.index_count = limits::kIndicesPerMesh; });
+  meshes("meshes-morphs-limit", "more than 2^26 morph offsets in all", 2, [](MeshRecord& m) {
+    m.vertex_count = limits::kVerticesPerMesh;
+    m.morph_targets.assign(limits::kMorphTargets / 2 + 1, {{1, 1, 1}, {1}});
+  });
 }
 
 void add_order(Vectors& vectors) {

@@ -123,7 +123,7 @@ TEST_CASE("a segment whose last chunks are missing is an error") {
   CHECK(all->errors[0].message.find("inside segment 0") != std::string::npos);
 }
 
-TEST_CASE("no changed byte goes unnoticed") {
+TEST_CASE("no changed byte goes unnoticed", "[long]") {
   const Bytes file = sample::file();
   const auto whole = intact();
   for (std::size_t i = 0; i < file.size(); ++i) {

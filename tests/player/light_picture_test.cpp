@@ -50,7 +50,7 @@ TEST_CASE("every truncation of a Radiance picture is refused") {
   }
 }
 
-TEST_CASE("a damaged Radiance picture gives an error or another picture, never more") {
+TEST_CASE("a damaged Radiance picture gives an error or another picture, never more", "[long]") {
   const Folder folder;
   auto pixels = rgbe_pixels(12 * 6);
   const std::string bytes = coded_hdr(pixels, 12);
@@ -187,7 +187,7 @@ TEST_CASE("every truncation of an OpenEXR picture is refused") {
   }
 }
 
-TEST_CASE("a damaged OpenEXR picture gives an error or another picture, never more") {
+TEST_CASE("a damaged OpenEXR picture gives an error or another picture, never more", "[long]") {
   const Folder folder;
   ExrWriter writer;
   const std::string bytes = writer.write(exr_value);

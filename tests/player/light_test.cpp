@@ -199,7 +199,7 @@ TEST_CASE("the content decides over the suffix") {
   CHECK(load_light(folder.write("a.hdr", R"({"sh": [[1,1,1]]})"))->light.order() == 0);
 }
 
-TEST_CASE("the assets' lights are the standard lights") {
+TEST_CASE("the assets' lights are the standard lights", "[long]") {
   const auto found = relit::test::shared_asset("../tools/standard_lights.json");
   if (!found) return;
   const auto standard = nlohmann::json::parse(read_bytes(found->string()));

@@ -148,7 +148,7 @@ TEST_CASE("the small file plays whole") {
   }
 }
 
-TEST_CASE("twenty thousand changed files are refused or play") {
+TEST_CASE("twenty thousand changed files are refused or play", "[long]") {
   std::mt19937 random(20);
   const std::vector<Bytes> files{coded_file({"ffv1", true, false, false}),
                                  coded_file({"ffv1", false, true, true}),

@@ -350,7 +350,7 @@ TEST_CASE("recover finds records that have moved to odd places") {
   }
 }
 
-TEST_CASE("whatever happened to a file, what recover writes is whole") {
+TEST_CASE("whatever happened to a file, what recover writes is whole", "[long]") {
   const Bytes file = shipped();
   int written = 0;
   for (std::uint32_t trial = 0; trial < 80; ++trial) {
