@@ -38,39 +38,42 @@ class Bake {
   Bake(const BakeOptions& options, Progress& progress) : options_(options), progress_(progress) {}
 
   Result<std::vector<BakeSummary>> run() {
-    for (const Output& output : outputs()) RELIT_TRY(check_output(output.path));
+    for (const BakeOutput& output : outputs_of(options_)) RELIT_TRY(check_output(output.path));
     if (!options_.reference.empty()) RELIT_TRY(check_output(options_.reference));
     RELIT_ASSIGN(prepared_, prepare_bake(options_));
     summarize();
     RELIT_TRY(trace());
+    std::optional<decoders::NpyWriter> reference;
+    if (!options_.reference.empty()) {
+      RELIT_ASSIGN(reference, write_reference());
+    }
     std::vector<BakeSummary> summaries;
-    for (const Output& output : outputs()) {
-      RELIT_ASSIGN(BakeSummary summary, write(output, summaries.empty()));
+    for (const BakeOutput& output : outputs_of(options_)) {
+      RELIT_ASSIGN(BakeSummary summary, write(output));
       summaries.push_back(std::move(summary));
     }
+    if (reference) RELIT_TRY(reference->commit());
     return summaries;
   }
 
  private:
-  struct Output {
-    std::filesystem::path path;
-    CodingOptions coding;
-  };
-  [[nodiscard]] std::vector<Output> outputs() const;
   static Status check_output(const std::filesystem::path& path);
   void summarize();
   Status find_seams(BakePoser& poser, const TraceGeometry& geometry);
   Status trace();
-  Result<BakeSummary> write(const Output& output, bool with_reference);
+  Result<BakeSummary> write(const BakeOutput& output);
   [[nodiscard]] std::vector<std::uint8_t> covered_texels() const;  // [H][W], 1: covered
   Result<PlaneSplit> split_planes(const CodingOptions& coding);
-  Result<RateChoice> find_rate(const RangeScan& scan, const ModelIds& ids);
-  Result<double> try_rate(RangeScan scan, const ModelIds& ids, double crf);
-  Result<RangeScan> scan_range(const CodingOptions& options, decoders::NpyWriter* reference);
+  Result<CodingOptions> choose(const BakeOutput& output);
+  Result<CodingTrial> try_coding(RangeScan scan);
+  [[nodiscard]] ModelIds ids() const;
+  Result<CodingOptions> resolved(const CodingOptions& options) const;
+  Result<const RangeScan*> scan_for(const CodingOptions& options);
+  Result<RangeScan> scan_range(const CodingOptions& options);
+  Result<decoders::NpyWriter> write_reference();  // not committed
   Result<TransferFrame> fill_frame(std::uint64_t frame);
   Status write_static(container::Writer& writer, const PlaneEncoder& encoder);
   Status write_segments(container::Writer& writer, PlaneEncoder& encoder);
-  Result<decoders::NpyWriter> create_reference() const;
   void fill_transfer(std::uint64_t frame);
 
   [[nodiscard]] std::size_t texels() const {
@@ -91,20 +94,10 @@ class Bake {
   std::optional<SeamStitcher> stitcher_;
   std::unique_ptr<BakeNormals> normals_;  // of models with a prediction
   std::vector<float> filled_;             // [coefficients][3][H][W] of the frame in hand
+  std::vector<RangeScan> scans_;          // of each way to split and quantise that was asked for
   glm::vec3 bounds_min_{std::numeric_limits<float>::infinity()};
   glm::vec3 bounds_max_{-std::numeric_limits<float>::infinity()};
 };
-
-std::vector<Bake::Output> Bake::outputs() const {
-  if (options_.sweep.empty()) return {{options_.output, options_.coding}};
-  std::vector<Output> outputs;
-  for (const CodingVariant& variant : options_.sweep) {
-    std::filesystem::path path = options_.output;
-    path.replace_filename(path.stem().string() + "-" + variant.name + path.extension().string());
-    outputs.push_back({std::move(path), variant.coding});
-  }
-  return outputs;
-}
 
 // An output that cannot be written should be known before an hour of tracing, not after it.
 Status Bake::check_output(const std::filesystem::path& path) {
@@ -277,7 +270,9 @@ Result<PlaneSplit> Bake::split_planes(const CodingOptions& coding) {
   if (coding.planes == Planes::kColour) return PlaneSplit::colour(shape, coding);
   std::vector<std::uint8_t> known(texels(), 0);
   if (coding.predict) {
-    RELIT_ASSIGN(normals_, BakeNormals::create(prepared_, shape.width, shape.height));
+    if (!normals_) {
+      RELIT_ASSIGN(normals_, BakeNormals::create(prepared_, shape.width, shape.height));
+    }
     known = normals_->mask();
   } else {
     for (const TexelSample& sample : prepared_.samples) known[sample.texel] = 1;
@@ -293,43 +288,91 @@ Result<PlaneSplit> Bake::split_planes(const CodingOptions& coding) {
   return PlaneSplit::principal(shape, analysis.finish(coding.principal_count), known);
 }
 
-// Measures what the planes have to hold, and writes the reference, if there is one, on the way.
-Result<RangeScan> Bake::scan_range(const CodingOptions& options, decoders::NpyWriter* reference) {
+ModelIds Bake::ids() const {
+  ModelIds ids;
+  ids.clip_id = prepared_.pose.track.clip_id;
+  ids.first_track_id = prepared_.pose.track.track_id + 1;
+  return ids;
+}
+
+Result<CodingOptions> Bake::resolved(const CodingOptions& options) const {
   CodingOptions coding = options;
   coding.segment_frames = static_cast<int>(prepared_.segment_frames);
   coding.threads = thread_count(options_.transfer.threads);
-  RELIT_ASSIGN(coding, resolve(coding));
+  return resolve(coding);
+}
+
+// Measures what the planes have to hold.
+Result<RangeScan> Bake::scan_range(const CodingOptions& coding) {
   RELIT_ASSIGN(PlaneSplit split, split_planes(coding));
   RELIT_ASSIGN(RangeScan scan, RangeScan::create(std::move(split), coding));
   progress_.start("measure", prepared_.frames, "frame");
   for (std::uint64_t k = 0; k < prepared_.frames; ++k) {
     RELIT_ASSIGN(const TransferFrame frame, fill_frame(k));
     RELIT_TRY(scan.add_frame(frame));
-    if (reference != nullptr) RELIT_TRY(reference->write(frame.transfer));
     progress_.advance(k + 1);
   }
   progress_.finish();
   return scan;
 }
 
-Result<RateChoice> Bake::find_rate(const RangeScan& scan, const ModelIds& ids) {
-  const CodingOptions& coding = scan.options();
-  if (coding.lossless) {
-    return fail(ErrorCode::kInvalid, "--target-psnr needs a lossy codec, and not --lossless");
+// Ways to code that differ in the stream alone share two passes over the clip.
+Result<const RangeScan*> Bake::scan_for(const CodingOptions& coding) {
+  for (RangeScan& scan : scans_) {
+    if (!same_planes(scan.options(), coding)) continue;
+    scan.set_stream(coding);
+    return &scan;
   }
-  return search_rate(*options_.target_psnr_db, rate_range(coding), *coding.crf,
-                     [&](double crf) { return try_rate(scan, ids, crf); });
+  RELIT_ASSIGN(RangeScan scan, scan_range(coding));
+  scans_.push_back(std::move(scan));
+  return &scans_.back();
+}
+
+Result<decoders::NpyWriter> Bake::write_reference() {
+  const std::uint64_t shape[] = {prepared_.frames, planes() / 3, 3,
+                                 static_cast<std::uint64_t>(options_.transfer.height),
+                                 static_cast<std::uint64_t>(options_.transfer.width)};
+  RELIT_ASSIGN(
+      decoders::NpyWriter reference,
+      decoders::NpyWriter::create(options_.reference, decoders::NpyWriter::Type::kFloat32, shape));
+  for (std::uint64_t k = 0; k < prepared_.frames; ++k) {
+    fill_transfer(k);
+    RELIT_TRY(reference.write(filled_));
+  }
+  return reference;
+}
+
+// Searches the candidates for what the goal asks.
+Result<CodingOptions> Bake::choose(const BakeOutput& output) {
+  if (!options_.goal) return resolved(output.candidates.front().coding);
+  const double clip_s = prepared_.time_s(prepared_.frames);
+  RELIT_ASSIGN(summary_.choice,
+               choose_coding(*options_.goal, output.candidates, clip_s,
+                             [&](std::size_t candidate, double crf) -> Result<CodingTrial> {
+                               CodingOptions coding = output.candidates[candidate].coding;
+                               coding.crf = crf;
+                               RELIT_ASSIGN(coding, resolved(coding));
+                               RELIT_ASSIGN(const RangeScan* const scan, scan_for(coding));
+                               return try_coding(*scan);
+                             }));
+  CodingOptions coding = output.candidates[summary_.choice->candidate].coding;
+  coding.crf = summary_.choice->trial.crf;
+  return resolved(coding);
 }
 
 // Codes and decodes the whole clip.
-Result<double> Bake::try_rate(RangeScan scan, const ModelIds& ids, double crf) {
-  scan.set_crf(crf);
-  RELIT_ASSIGN(PlaneEncoder encoder, PlaneEncoder::begin(std::move(scan), ids));
+Result<CodingTrial> Bake::try_coding(RangeScan scan) {
+  CodingTrial trial{*scan.options().crf, 0, {}};
+  for (const auto& packet : prepared_.pose.packets) trial.bytes += packet.size();
+  RELIT_ASSIGN(PlaneEncoder encoder, PlaneEncoder::begin(std::move(scan), ids()));
   RELIT_ASSIGN(auto decoder, decoders::PlaneDecoder::open(encoder.model(), encoder.layers()));
   const auto take = [&]() -> Status {
-    while (std::optional<EncodedSegment> segment = encoder.take_segment())
-      for (container::ChunkRecord& chunk : segment->chunks)
+    while (std::optional<EncodedSegment> segment = encoder.take_segment()) {
+      for (container::ChunkRecord& chunk : segment->chunks) {
+        trial.bytes += chunk.data.size();
         RELIT_TRY(decoder.add_chunk(segment->segment, std::move(chunk)));
+      }
+    }
     return {};
   };
   decoders::RelitError error(decoders::standard_lights(),
@@ -355,28 +398,16 @@ Result<double> Bake::try_rate(RangeScan scan, const ModelIds& ids, double crf) {
     progress_.advance(prepared_.frames + k + 1);
   }
   progress_.finish();
-  return error.figures().psnr_db;
+  trial.figures = error.figures();
+  return trial;
 }
 
-Result<BakeSummary> Bake::write(const Output& output, bool with_reference) {
+Result<BakeSummary> Bake::write(const BakeOutput& output) {
   const Stopwatch watch;
   const BakeSummary before = summary_;
-  normals_.reset();
-  std::optional<decoders::NpyWriter> reference;
-  if (with_reference && !options_.reference.empty()) {
-    RELIT_ASSIGN(reference, create_reference());
-  }
-  RELIT_ASSIGN(RangeScan scan, scan_range(output.coding, reference ? &*reference : nullptr));
-  ModelIds ids;
-  ids.clip_id = prepared_.pose.track.clip_id;
-  ids.first_track_id = prepared_.pose.track.track_id + 1;
-  if (options_.target_psnr_db) {
-    RELIT_ASSIGN(const RateChoice rate, find_rate(scan, ids));
-    scan.set_crf(rate.crf);
-    summary_.relit_psnr_db = rate.psnr_db;
-  }
-  summary_.crf = *scan.options().crf;
-  RELIT_ASSIGN(PlaneEncoder encoder, PlaneEncoder::begin(std::move(scan), ids));
+  RELIT_ASSIGN(summary_.coding, choose(output));
+  RELIT_ASSIGN(const RangeScan* const scan, scan_for(summary_.coding));
+  RELIT_ASSIGN(PlaneEncoder encoder, PlaneEncoder::begin(*scan, ids()));
   summary_.decoder_bytes = encoder.decoder_bytes();
   RELIT_ASSIGN(auto sink, container::FileSink::create(output.path.string()));
   RELIT_ASSIGN(container::Writer writer,
@@ -393,20 +424,11 @@ Result<BakeSummary> Bake::write(const Output& output, bool with_reference) {
   RELIT_TRY(write_segments(writer, encoder));
   RELIT_TRY(writer.finish());
   progress_.finish();
-  if (reference) RELIT_TRY(reference->commit());
   RELIT_TRY(sink->commit());
   summary_.bytes = writer.bytes_written();
   summary_.code_s = watch.seconds();
   summary_.output = output.path;
   return std::exchange(summary_, before);
-}
-
-Result<decoders::NpyWriter> Bake::create_reference() const {
-  const std::uint64_t shape[] = {prepared_.frames, planes() / 3, 3,
-                                 static_cast<std::uint64_t>(options_.transfer.height),
-                                 static_cast<std::uint64_t>(options_.transfer.width)};
-  return decoders::NpyWriter::create(options_.reference, decoders::NpyWriter::Type::kFloat32,
-                                     shape);
 }
 
 }  // namespace

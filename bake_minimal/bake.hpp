@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "bake_minimal/atlas.hpp"
+#include "bake_minimal/coding_choice.hpp"
 #include "bake_minimal/coding_options.hpp"
 #include "bake_minimal/ground.hpp"
 #include "bake_minimal/mesh_packer.hpp"
@@ -41,12 +42,22 @@ struct BakeOptions {
   /// Where not empty, the clip is coded once for each of them in place of `coding`: into the
   /// output's name with "-" and the variant's before its extension.
   std::vector<CodingVariant> sweep{};
-  /// Where given, the rate factor is sought with which the relit PSNR over the standard lights is
-  /// this or a little more.
-  std::optional<double> target_psnr_db{};
+  /// Where given, the rate factor is sought, of each variant of a sweep by itself; without a sweep
+  /// also the cheapest of `candidates`, or of `coding` alone where there are none.
+  std::optional<Goal> goal{};
+  std::vector<CodingVariant> candidates{};
   PoseChoice pose = PoseChoice::kAuto;
   bool write_normals = false;
 };
+
+/// A file that a bake writes, and the ways to code it of which it takes one.
+struct BakeOutput {
+  std::filesystem::path path;
+  std::vector<CodingVariant> candidates;
+};
+
+/// One, or one for each variant of a sweep.
+[[nodiscard]] std::vector<BakeOutput> outputs_of(const BakeOptions& options);
 
 /// What a bake made, for people and for --json.
 struct BakeSummary {
@@ -61,8 +72,8 @@ struct BakeSummary {
   float least_t0 = std::numeric_limits<float>::infinity();
   float largest_t0 = -std::numeric_limits<float>::infinity();
   double trace_s = 0, code_s = 0;
-  double crf = 0;
-  std::optional<double> relit_psnr_db;  ///< where a target was given
+  CodingOptions coding;                  ///< resolved
+  std::optional<CodingChoice> choice{};  ///< where there was a goal
   std::uint64_t bytes = 0, image_bytes = 0, mesh_bytes = 0, pose_bytes = 0, video_bytes = 0;
   std::uint64_t decoder_bytes = 0;  ///< of the pictures that the decoders hold
   std::vector<std::string> warnings;

@@ -143,7 +143,7 @@ TEST_CASE("a lossless file holds the reference to within the quantiser's bound")
   }
 }
 
-TEST_CASE("a sweep codes one trace in several ways, each as it would be by itself") {
+TEST_CASE("a sweep codes one trace in several ways, each as it would be by itself", "[long]") {
   const Folder folder;
   BakeOptions options = small_bake(folder, "sweep.relit");
   options.reference = folder.path / "reference.npy";
@@ -170,25 +170,25 @@ TEST_CASE("a sweep codes one trace in several ways, each as it would be by itsel
   CHECK((*summaries)[0].video_bytes > (*summaries)[1].video_bytes);
 }
 
-TEST_CASE("a target is met by the file that is written, as its dump is measured") {
+TEST_CASE("a target is met by the file that is written, as its dump is measured", "[long]") {
   const Folder folder;
   for (const double target : {34.0, 41.0}) {
     BakeOptions options = small_bake(folder, "target.relit");
     options.reference = folder.path / "reference.npy";
-    options.target_psnr_db = target;
+    options.goal = Goal{Goal::Kind::kPsnr, target};
     const BakeSummary summary = must_bake(options);
-    REQUIRE(summary.relit_psnr_db);
-    CHECK(*summary.relit_psnr_db >= target);
+    REQUIRE(summary.choice);
+    CHECK(summary.choice->trial.figures.psnr_db >= target);
     // Of three small frames by the fastest preset, a step of the factor moves up to 0.6 dB.
-    CHECK(*summary.relit_psnr_db <= target + 0.75);
+    CHECK(summary.choice->trial.figures.psnr_db <= target + 0.75);
     // A file that was baked with that factor is the same.
     BakeOptions single = small_bake(folder, "single.relit");
-    single.coding.crf = summary.crf;
-    CHECK_FALSE(must_bake(single).relit_psnr_db);
+    single.coding.crf = summary.coding.crf;
+    CHECK_FALSE(must_bake(single).choice);
     CHECK(bytes_of(single.output) == bytes_of(options.output));
   }
   BakeOptions options = small_bake(folder, "target.relit");
-  options.target_psnr_db = 90;
+  options.goal = Goal{Goal::Kind::kPsnr, 90};
   Progress quiet(true);
   const auto beyond = bake::bake(options, quiet);
   REQUIRE(!beyond);
