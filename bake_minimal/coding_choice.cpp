@@ -16,7 +16,7 @@ using Outcome = CandidateReport::Outcome;
 /// Rate factors that double the bytes.
 constexpr double kDoubling = 6;
 /// Projections from one trial are that much off at most: a candidate that is projected worse than
-/// by this is left alone.
+/// by this is left alone, and so is one that costs that much more and still falls short.
 constexpr double kHopelessRatio = 1.3;
 constexpr double kHopeless_db = 1.3;
 /// How far the neighbours lie that tell what accuracy costs: about 2 dB.
@@ -73,7 +73,9 @@ class CandidateSearch {
     const auto score = [&](double signed_crf) -> Result<double> {
       RELIT_ASSIGN(const CodingTrial trial, attempt(sign * signed_crf));
       trials.push_back(trial);
-      abandoned = trials.size() == 1 && hopeless(projected_cost(trial), best_cost);
+      const bool short_of_it = score_db(trial) < target_db();
+      abandoned = (trials.size() == 1 && hopeless(projected_cost(trial), best_cost)) ||
+                  (short_of_it && hopeless(cost(trial), best_cost));
       // The search ends at once with what it takes for the target.
       return abandoned ? target_db() : score_db(trial);
     };
