@@ -329,7 +329,7 @@ nlohmann::ordered_json trial_json(const CodingTrial& trial) {
           {"error_p99", trial.figures.p99}};
 }
 
-nlohmann::ordered_json summary_json(const BakeSummary& s, const BakeOptions& options) {
+nlohmann::ordered_json summary_json(const BakeSummary& s) {
   nlohmann::ordered_json json;
   json["output"] = s.output.string();
   json["clip"] = s.clip;
@@ -376,7 +376,7 @@ nlohmann::ordered_json summary_json(const BakeSummary& s, const BakeOptions& opt
 /// An object, or for a sweep a list of them.
 void print_json(const std::vector<BakeSummary>& summaries, const BakeOptions& options) {
   nlohmann::ordered_json json = nlohmann::ordered_json::array();
-  for (const BakeSummary& summary : summaries) json.push_back(summary_json(summary, options));
+  for (const BakeSummary& summary : summaries) json.push_back(summary_json(summary));
   if (options.sweep.empty()) json = nlohmann::ordered_json(json.front());
   std::printf("%s\n", json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
 }
