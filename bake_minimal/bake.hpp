@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "bake_minimal/atlas.hpp"
+#include "bake_minimal/coding_choice.hpp"
 #include "bake_minimal/coding_options.hpp"
 #include "bake_minimal/ground.hpp"
 #include "bake_minimal/mesh_packer.hpp"
@@ -41,18 +42,29 @@ struct BakeOptions {
   /// Where not empty, the clip is coded once for each of them in place of `coding`: into the
   /// output's name with "-" and the variant's before its extension.
   std::vector<CodingVariant> sweep{};
-  /// Where given, the rate factor is sought with which the relit PSNR over the standard lights is
-  /// this or a little more.
-  std::optional<double> target_psnr_db{};
+  /// Where given, the rate factor is sought, of each variant of a sweep by itself; without a sweep
+  /// also the cheapest of `candidates`, or of `coding` alone where there are none.
+  std::optional<Goal> goal{};
+  std::vector<CodingVariant> candidates{};
   PoseChoice pose = PoseChoice::kAuto;
   bool write_normals = false;
 };
+
+/// A file that a bake writes, and the ways to code it of which it takes one.
+struct BakeOutput {
+  std::filesystem::path path;
+  std::vector<CodingVariant> candidates;
+};
+
+/// One, or one for each variant of a sweep.
+[[nodiscard]] std::vector<BakeOutput> outputs_of(const BakeOptions& options);
 
 /// What a bake made, for people and for --json.
 struct BakeSummary {
   std::filesystem::path output;
   std::string clip;
-  std::uint64_t frames = 0;
+  std::uint64_t frames = 0;  ///< that the file holds
+  container::Rational frame_rate;
   int order = 0, width = 0, height = 0;
   std::size_t vertices = 0, triangles = 0, samples = 0, covered = 0;
   AtlasReport atlas;
@@ -61,8 +73,8 @@ struct BakeSummary {
   float least_t0 = std::numeric_limits<float>::infinity();
   float largest_t0 = -std::numeric_limits<float>::infinity();
   double trace_s = 0, code_s = 0;
-  double crf = 0;
-  std::optional<double> relit_psnr_db;  ///< where a target was given
+  CodingOptions coding;                  ///< resolved
+  std::optional<CodingChoice> choice{};  ///< where there was a goal
   std::uint64_t bytes = 0, image_bytes = 0, mesh_bytes = 0, pose_bytes = 0, video_bytes = 0;
   std::uint64_t decoder_bytes = 0;  ///< of the pictures that the decoders hold
   std::vector<std::string> warnings;
@@ -119,13 +131,30 @@ class BakePoser {
   std::vector<glm::vec3> positions_, normals_, primitive_positions_, primitive_normals_;
 };
 
+/// The frames that a file holds of those that were traced: every `step`th.
+struct KeptFrames {
+  int step = 1;
+  std::uint64_t count = 1;
+  std::uint32_t segment_frames = 25;
+  container::Rational rate;  ///< frames a second
+  PoseEncoding pose;
+  /// Root mean square of how far vertices of blended poses lie from where the frames that are left
+  /// out have them, over the longest side of the box around the clip.
+  double pose_error = 0;
+};
+
+/// Errors: kInvalid where `step` does not divide the frames of a clip, since its end would move;
+/// those of encode_pose().
+[[nodiscard]] Result<KeptFrames> keep_frames(const PreparedBake& prepared, int step);
+
 /// The normals of the light map's texels, frame by frame, as the player will have them.
 class BakeNormals {
  public:
   /// Errors: those of decoders::PoseTrack and decoders::TexelNormals.
-  static Result<std::unique_ptr<BakeNormals>> create(const PreparedBake& prepared, int width,
-                                                     int height);
-  /// [H][W]; valid until the next call. Errors: those of decoders::PoseTrack.
+  static Result<std::unique_ptr<BakeNormals>> create(const PreparedBake& prepared,
+                                                     const KeptFrames& kept, int width, int height);
+  /// [H][W], of one of the frames that are kept; valid until the next call. Errors: those of
+  /// decoders::PoseTrack.
   Result<std::span<const glm::vec3>> at(std::uint64_t frame);
   /// [H][W], 1 where a texel has a normal.
   [[nodiscard]] std::vector<std::uint8_t> mask() const;

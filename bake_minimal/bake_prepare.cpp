@@ -86,12 +86,11 @@ Status pack(const BakeOptions& options, PreparedBake& out) {
   // What is predicted from normals is predicted from those in the file. A twentieth of a mesh, they
   // save a fifth of the planes over what the triangles alone tell.
   pack_options.normals = options.write_normals;
-  std::vector<CodingOptions> codings{options.coding};
-  if (!options.sweep.empty()) codings.clear();
-  for (const CodingVariant& variant : options.sweep) codings.push_back(variant.coding);
-  for (const CodingOptions& each : codings) {
-    RELIT_ASSIGN(const CodingOptions coding, resolve(each));
-    pack_options.normals |= coding.planes == Planes::kPrincipal && coding.predict;
+  for (const BakeOutput& output : outputs_of(options)) {
+    for (const CodingVariant& each : output.candidates) {
+      RELIT_ASSIGN(const CodingOptions coding, resolve(each.coding));
+      pack_options.normals |= coding.planes == Planes::kPrincipal && coding.predict;
+    }
   }
   RELIT_ASSIGN(out.packed, pack_scene(out.scene, pack_options));
   std::vector<double> times(out.frames);
@@ -118,6 +117,22 @@ Status rasterize(const BakeOptions& options, PreparedBake& out) {
 }
 
 }  // namespace
+
+std::vector<BakeOutput> outputs_of(const BakeOptions& options) {
+  if (options.sweep.empty()) {
+    BakeOutput output{options.output, options.candidates};
+    if (!options.goal || output.candidates.empty())
+      output.candidates = {{options.coding.codec, options.coding}};
+    return {std::move(output)};
+  }
+  std::vector<BakeOutput> outputs;
+  for (const CodingVariant& variant : options.sweep) {
+    std::filesystem::path path = options.output;
+    path.replace_filename(path.stem().string() + "-" + variant.name + path.extension().string());
+    outputs.push_back({std::move(path), {variant}});
+  }
+  return outputs;
+}
 
 double PreparedBake::time_s(std::uint64_t frame) const {
   return static_cast<double>(frame) / fps_of(frame_rate);

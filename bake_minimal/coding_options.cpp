@@ -6,6 +6,7 @@
 #include <bit>
 #include <cmath>
 #include <string_view>
+#include <tuple>
 
 #include "container/base/limits.hpp"
 
@@ -43,22 +44,23 @@ const CodecTraits* find_codec(std::string_view name) {
 Unexpected invalid(std::string message) { return fail(ErrorCode::kInvalid, std::move(message)); }
 
 Status choose_planes(CodingOptions& o, bool only_420) {
-  const bool other_chroma = o.chroma && *o.chroma != Chroma::kLuma;
-  const bool possible = !other_chroma && o.exponent_block == 0 && !only_420;
+  const bool possible = o.exponent_block == 0 && (!o.chroma || *o.chroma != Chroma::k444) &&
+                        !(o.lossless && o.chroma == Chroma::k420);
   if (o.planes == Planes::kAuto) {
-    const bool natural = possible && !o.chroma && !o.lossless && o.layout == Layout::kLayered;
+    const bool natural =
+        possible && !only_420 && !o.chroma && !o.lossless && o.layout == Layout::kLayered;
     o.planes = natural ? Planes::kPrincipal : Planes::kColour;
   }
   if (o.planes == Planes::kColour) return {};
   if (!possible) {
     return invalid(
-        "--planes principal takes --chroma luma, --exponent-block 0 and a codec with it, "
-        "which mpeg4 is not");
+        "--planes principal takes --chroma luma, or 420 for decoders that have nothing else, and "
+        "--exponent-block 0");
   }
   if (o.principal_count < 0 || o.principal_count > 48) {
     return invalid("principal planes are 1 to 48, or 0, not " + std::to_string(o.principal_count));
   }
-  o.chroma = Chroma::kLuma;
+  if (!o.chroma) o.chroma = only_420 ? Chroma::k420 : Chroma::kLuma;
   return {};
 }
 
@@ -112,6 +114,29 @@ CodingOptions paper_options() {
   return options;
 }
 
+bool same_planes(const CodingOptions& a, const CodingOptions& b) {
+  const auto planes = [](const CodingOptions& o) {
+    return std::tuple(o.lossless, *o.bit_depth, o.planes, o.principal_count, o.predict, *o.chroma,
+                      o.exponent_block, o.exponent_hold, o.frame_step, o.layout, o.segment_frames,
+                      o.uniform_steps, o.centred);
+  };
+  return planes(a) == planes(b);
+}
+
+Result<CodingOptions> hardware_options(const CodingOptions& base) {
+  CodingOptions options = base;
+  options.codec = "h264";
+  options.bit_depth = 8;
+  options.chroma = Chroma::k420;
+  if (options.planes == Planes::kAuto) options.planes = Planes::kPrincipal;
+  if (options.lossless || options.exponent_block != 0) {
+    return invalid(
+        "--profile hardware is lossy H.264 without exponents, whose pictures are FFV1: leave out "
+        "--lossless and --exponent-block");
+  }
+  return options;
+}
+
 Result<CodingOptions> resolve(CodingOptions o) {
   const CodecTraits* const codec = find_codec(o.codec);
   if (codec == nullptr) {
@@ -119,6 +144,10 @@ Result<CodingOptions> resolve(CodingOptions o) {
                    " is not known; h264, hevc, mpeg4, ffv1, vp9 and av1 are");
   }
   if (!codec->lossy) o.lossless = true;
+  if (o.frame_step < 0 || o.frame_step > 64) {
+    return invalid("--frame-step is 1 to 64, not " + std::to_string(o.frame_step));
+  }
+  o.frame_step = std::max(o.frame_step, 1);
   if (o.lossless && !codec->lossless) {
     return invalid("--codec " + o.codec + " cannot be lossless; h264, hevc, vp9 and ffv1 can");
   }

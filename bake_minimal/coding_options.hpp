@@ -42,8 +42,9 @@ struct CodingOptions {
   std::optional<int>
       bit_depth;  ///< of mantissas, 8 or 10. Default: 10; 8 for mpeg4 and with exponents
 
-  /// Principal planes take luma, no exponents and layers; with kAuto they are taken unless chroma,
-  /// exponents, the grid, lossless coding or a codec without luma is asked for.
+  /// Principal planes take luma, or 4:2:0 with grey chroma, and no exponents; with kAuto they are
+  /// taken unless chroma, exponents, the grid, lossless coding or a codec without luma is asked
+  /// for.
   Planes planes = Planes::kAuto;
   /// Principal planes besides s, at most; 0: as many as leave less than 1e-5 of the composites'
   /// mean square out, which is about 60 dB below their peaks.
@@ -61,6 +62,10 @@ struct CodingOptions {
   /// Frames that share one exponent picture, from the segment's first frame on; 0: the whole
   /// segment.
   int exponent_hold = 0;
+
+  /// Every so many frames are kept of those that were traced, and players blend in between (Xu et
+  /// al., key frames). 0: all, or with a goal what it takes.
+  int frame_step = 0;
 
   Layout layout = Layout::kLayered;
   int segment_frames = 25;  ///< frames a segment, each a closed group of pictures
@@ -92,6 +97,14 @@ struct CodingOptions {
 /// Xu et al., section 4: the order-N grid, mantissas of 8 bits through MPEG-4's 4:2:0, one exponent
 /// for every texel of every frame, through FFV1.
 [[nodiscard]] CodingOptions paper_options();
+
+/// Whether a clip has the same planes, ranges and steps under both, which are resolved: they differ
+/// in what an encoder makes of them alone.
+[[nodiscard]] bool same_planes(const CodingOptions& a, const CodingOptions& b);
+
+/// `base` within what hardware decoders take everywhere: H.264 High, 8 bits, 4:2:0, of which
+/// principal planes leave the chroma grey. Errors: kInvalid for lossless coding and exponents.
+[[nodiscard]] Result<CodingOptions> hardware_options(const CodingOptions& base);
 
 /// Fills in what is open and checks the combination. Errors: kInvalid, saying what would be right.
 [[nodiscard]] Result<CodingOptions> resolve(CodingOptions options);

@@ -80,8 +80,8 @@ class RangeScan {
   [[nodiscard]] std::uint64_t frame_count() const { return frame_count_; }
   [[nodiscard]] const PlaneSplit& split() const { return split_; }
   [[nodiscard]] const CodingOptions& options() const { return options_; }
-  /// Ranges and steps do not depend on the rate factor.
-  void set_crf(double crf) { options_.crf = crf; }
+  /// Takes all that ranges and steps do not depend on: `resolved` is of same_planes().
+  void set_stream(const CodingOptions& resolved) { options_ = resolved; }
 
   /// μ[n]: the middles of the ranges where options.centred and there are no exponents, else zero.
   [[nodiscard]] std::vector<Rgb> mean() const;

@@ -149,7 +149,8 @@ class Quantizer {
       low = glm::min(low, glm::vec3(v, 0.0f));
       high = glm::max(high, glm::vec3(v, 0.0f));
     }
-    const double range = std::max(static_cast<double>(high.x) - low.x, static_cast<double>(high.y) - low.y);
+    const double range =
+        std::max(static_cast<double>(high.x) - low.x, static_cast<double>(high.y) - low.y);
     const Grid grid = uniform_grid(low, high, albedo_bits(range));
     streams.push_back(uv_stream(Semantic::kAlbedoUv, grid, uv));
   }

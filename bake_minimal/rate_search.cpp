@@ -3,27 +3,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <optional>
-#include <string>
 
 namespace relit::bake {
 namespace {
 
 constexpr double kEnough_db = 0.15;
-/// What a step of one in the rate factor costs, about: six double the quantiser's.
-constexpr double kSlope_db = 0.55;
-
-std::string decimal(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.4g", value);
-  return text;
-}
 
 }  // namespace
 
 Result<RateChoice> search_rate(double target_db, const RateRange& range, double begin,
-                               const std::function<Result<double>(double crf)>& psnr_db) {
+                               const std::function<Result<double>(double crf)>& score_db) {
   std::optional<RateChoice> good;        // the coarsest that reaches the target
   std::optional<RateChoice> too_coarse;  // the finest that does not
   const auto on_grid = [&](double crf) {
@@ -32,31 +22,28 @@ Result<RateChoice> search_rate(double target_db, const RateRange& range, double 
   };
   double crf = on_grid(begin);
   for (int tries = 1;; ++tries) {
-    RELIT_ASSIGN(const double found_db, psnr_db(crf));
+    RELIT_ASSIGN(const double found_db, score_db(crf));
     (found_db >= target_db ? good : too_coarse) = RateChoice{crf, found_db, tries};
     if (good) good->tries = tries;
-    const bool close = good && good->psnr_db <= target_db + kEnough_db;
+    const bool close = good && good->score_db <= target_db + kEnough_db;
     const bool at_end = good && (good->crf >= range.coarsest ||
                                  (too_coarse && too_coarse->crf - good->crf <= range.step * 1.01));
     if (close || at_end) return *good;
     if (too_coarse && too_coarse->crf <= range.finest) {
-      return fail(ErrorCode::kInvalid,
-                  decimal(target_db) + " dB are out of reach: the finest rate factor, " +
-                      decimal(range.finest) + ", gives " + decimal(found_db) +
-                      " dB; use --bit-depth 10, more --principal-count or --planes colour");
+      return RateChoice{too_coarse->crf, too_coarse->score_db, tries, false};
     }
     const double wanted_db = target_db + kEnough_db / 3;
     if (!good || !too_coarse) {
       // Infinite where nothing differs.
       const double excess_db = std::clamp(found_db - wanted_db, -40.0, 40.0);
-      const double next = on_grid(crf + excess_db / kSlope_db);
+      const double next = on_grid(crf + excess_db / kRateSlope_db);
       crf = good ? std::max(next, good->crf + range.step)
                  : std::min(next, too_coarse->crf - range.step);
     } else {
       // Between the two, straight; every third time in the middle, which no curve can hold up.
-      const double low_db = std::min(good->psnr_db, target_db + 40);
+      const double low_db = std::min(good->score_db, target_db + 40);
       const double share =
-          tries % 3 == 0 ? 0.5 : (low_db - wanted_db) / (low_db - too_coarse->psnr_db);
+          tries % 3 == 0 ? 0.5 : (low_db - wanted_db) / (low_db - too_coarse->score_db);
       crf = std::clamp(on_grid(std::lerp(good->crf, too_coarse->crf, share)),
                        good->crf + range.step, too_coarse->crf - range.step);
     }

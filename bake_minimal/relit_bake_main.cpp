@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 #include <numeric>
+#include <utility>
 
 #include "bake_minimal/bake.hpp"
 
@@ -21,6 +23,8 @@ constexpr const char* kExamples = R"(Examples:
       one clip of several, on a disc that receives its shadow
   relit-bake robot.glb robot.relit --lightmap-uv unwrap --crf 14
       new light-map UVs, finer quantisation
+  relit-bake man.glb man.relit --target-psnr 40
+      the smallest file of that quality, and what was tried for it
   relit-bake man.glb paper.relit --preset paper --reference man.npy
       the scheme of Xu et al. and the unquantised bake, to compare
 
@@ -30,9 +34,9 @@ Exit status: 0 success, 1 the input is bad, 2 usage or environment.)";
 struct Arguments {
   BakeOptions bake;
   std::string clip, lightmap_uv = "auto", layout = "layered", preset, chroma, model = "shlm",
-                    planes = "auto", sweep, pose = "auto", fps = "50";
+                    planes = "auto", sweep, pose = "auto", fps = "50", budget, profile;
   std::vector<int> size{128};
-  double crf = 0, target_psnr = 0, ground_radius = 0;
+  double crf = 0, target_psnr = 0, target_error = 0, ground_radius = 0;
   int bit_depth = 0;
   std::vector<float> ground_color;
   bool list_clips = false, json = false, quiet = false, once = false, ground = false,
@@ -44,6 +48,22 @@ int report(const Error& error) {
   const bool usage = error.code == ErrorCode::kInvalid || error.code == ErrorCode::kEnvironment ||
                      error.code == ErrorCode::kOutOfMemory;
   return usage ? kUsage : kBadInput;
+}
+
+// Bytes a second from "1Mbit/s", "800kbit/s" or "125kB/s".
+Result<double> parse_budget(const std::string& text) {
+  constexpr std::pair<const char*, double> kUnits[] = {{"bit/s", 1.0 / 8},  {"kbit/s", 1e3 / 8},
+                                                       {"Mbit/s", 1e6 / 8}, {"B/s", 1},
+                                                       {"kB/s", 1e3},       {"MB/s", 1e6}};
+  double value = 0;
+  int used = 0;
+  if (std::sscanf(text.c_str(), "%lf%n", &value, &used) == 1 && std::isfinite(value) && value > 0) {
+    for (const auto& [unit, bytes] : kUnits)
+      if (text.substr(static_cast<std::size_t>(used)) == unit) return value * bytes;
+  }
+  return fail(ErrorCode::kInvalid, "--budget " + text +
+                                       ": it must be a positive number and one of bit/s, kbit/s, "
+                                       "Mbit/s, B/s, kB/s, MB/s, such as 1Mbit/s");
 }
 
 // "50", "23.976" or "30000/1001".
@@ -162,6 +182,11 @@ void add_options(CLI::App& app, Arguments& a) {
   app.add_option("--segment", a.bake.segment_s, "seconds that can be decoded by themselves")
       ->capture_default_str()
       ->group("Coding");
+  app.add_option("--frame-step", a.bake.coding.frame_step,
+                 "keep every so many frames of those traced, and have players blend in between; 0: "
+                 "all, or what a target takes")
+      ->capture_default_str()
+      ->group("Coding");
   app.add_option("--layout", a.layout, "layered or grid")
       ->check(CLI::IsMember({"layered", "grid"}))
       ->capture_default_str()
@@ -181,10 +206,30 @@ void add_options(CLI::App& app, Arguments& a) {
                "write the normals, for hosts that shade for themselves, in any case")
       ->group("Coding");
 
-  app.add_option("--target-psnr", a.target_psnr,
-                 "seek the rate factor for this relit PSNR, dB over the standard lights")
-      ->check(CLI::Range(10.0, 100.0))
+  app.add_option("--profile", a.profile,
+                 "hardware: what hardware decoders take, H.264 of 8 bits in 4:2:0")
+      ->check(CLI::IsMember({"hardware"}))
+      ->excludes("--codec", "--chroma", "--bit-depth", "--preset")
       ->group("Coding");
+
+  CLI::Option* const psnr =
+      app.add_option("--target-psnr", a.target_psnr,
+                     "seek the smallest coding with this relit PSNR, dB over the standard lights; "
+                     "the codec too, unless --codec names one")
+          ->check(CLI::Range(10.0, 100.0))
+          ->excludes("--crf")
+          ->group("Goal");
+  CLI::Option* const error =
+      app.add_option("--target-error", a.target_error,
+                     "likewise for the 99th percentile of the error, relative to the peak: 0.01")
+          ->check(CLI::Range(1e-6, 0.5))
+          ->excludes("--crf", psnr)
+          ->group("Goal");
+  app.add_option("--budget", a.budget,
+                 "seek the best coding of which a second takes no more, as 1Mbit/s or 125kB/s; "
+                 "what is sent once comes on top")
+      ->excludes("--crf", psnr, error)
+      ->group("Goal");
   app.add_option("--sweep", a.sweep,
                  "code one trace in several ways, such as \"codec=h264,hevc crf=12,18,24\": "
                  "OUT-h264-crf12.relit and so on")
@@ -233,7 +278,17 @@ Status complete(Arguments& a, const CLI::App& app) {
   if (a.chroma == "420") bake.coding.chroma = container::Chroma::k420;
   if (a.chroma == "444") bake.coding.chroma = container::Chroma::k444;
   if (a.chroma == "luma") bake.coding.chroma = container::Chroma::kLuma;
-  if (app.count("--target-psnr") > 0) bake.target_psnr_db = a.target_psnr;
+  if (a.profile == "hardware") {
+    RELIT_ASSIGN(bake.coding, hardware_options(bake.coding));
+  }
+  if (app.count("--target-psnr") > 0) bake.goal = Goal{Goal::Kind::kPsnr, a.target_psnr};
+  if (app.count("--target-error") > 0) bake.goal = Goal{Goal::Kind::kError, a.target_error};
+  if (!a.budget.empty()) {
+    RELIT_ASSIGN(const double bytes, parse_budget(a.budget));
+    bake.goal = Goal{Goal::Kind::kBudget, bytes};
+  }
+  const bool any_codec = app.count("--codec") == 0 && a.preset.empty() && a.profile.empty();
+  if (bake.goal) bake.candidates = coding_candidates(bake.coding, any_codec);
   if (!a.sweep.empty()) {
     RELIT_ASSIGN(bake.sweep, expand_sweep(a.sweep, bake.coding));
   }
@@ -253,12 +308,33 @@ int list_clips(const std::filesystem::path& input) {
   return 0;
 }
 
+const char* outcome_name(const CandidateReport& report) {
+  switch (report.outcome) {
+    case CandidateReport::Outcome::kReached:
+      return "reached";
+    case CandidateReport::Outcome::kAbandoned:
+      return "abandoned";
+    case CandidateReport::Outcome::kOutOfReach:
+      return "out of reach";
+    case CandidateReport::Outcome::kUnavailable:
+      return "no such encoder here";
+  }
+  return "";
+}
+
+nlohmann::ordered_json trial_json(const CodingTrial& trial) {
+  return {{"crf", trial.crf},
+          {"segment_bytes", trial.bytes},
+          {"relit_psnr_db", trial.figures.psnr_db},
+          {"error_p99", trial.figures.p99}};
+}
+
 nlohmann::ordered_json summary_json(const BakeSummary& s, const BakeOptions& options) {
   nlohmann::ordered_json json;
   json["output"] = s.output.string();
   json["clip"] = s.clip;
   json["frames"] = s.frames;
-  json["fps"] = {options.frame_rate.num, options.frame_rate.den};
+  json["fps"] = {s.frame_rate.num, s.frame_rate.den};
   json["order"] = s.order;
   json["size"] = {s.width, s.height};
   json["vertices"] = s.vertices;
@@ -272,8 +348,23 @@ nlohmann::ordered_json summary_json(const BakeSummary& s, const BakeOptions& opt
                          {"reason", s.atlas.reason}};
   json["rays"] = s.rays;
   json["t0"] = {s.least_t0, s.largest_t0};
-  json["crf"] = s.crf;
-  if (s.relit_psnr_db) json["relit_psnr_db"] = *s.relit_psnr_db;
+  json["codec"] = s.coding.codec;
+  json["crf"] = *s.coding.crf;
+  if (s.choice) {
+    json["relit_psnr_db"] = s.choice->trial.figures.psnr_db;
+    json["error_p99"] = s.choice->trial.figures.p99;
+    json["candidates"] = nlohmann::ordered_json::array();
+    for (const CandidateReport& report : s.choice->reports) {
+      nlohmann::ordered_json each = {{"name", report.name}, {"outcome", outcome_name(report)}};
+      if (report.outcome != CandidateReport::Outcome::kUnavailable)
+        each.update(trial_json(report.best));
+      each["tries"] = report.tries;
+      json["candidates"].push_back(std::move(each));
+    }
+    json["coarser_and_finer"] = nlohmann::ordered_json::array();
+    for (const CodingTrial& trial : s.choice->coarser_and_finer)
+      json["coarser_and_finer"].push_back(trial_json(trial));
+  }
   json["seconds"] = {{"trace", s.trace_s}, {"code", s.code_s}};
   json["bytes"] = {{"file", s.bytes},        {"images", s.image_bytes},
                    {"meshes", s.mesh_bytes}, {"pose", s.pose_bytes},
@@ -290,13 +381,34 @@ void print_json(const std::vector<BakeSummary>& summaries, const BakeOptions& op
   std::printf("%s\n", json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
 }
 
+void print_trial(const std::string& name, const CodingTrial& trial, const char* remark) {
+  std::fprintf(stderr, "  %-12s crf %-6g %10llu bytes %7.2f dB  p99 %.4f  %s\n", name.c_str(),
+               trial.crf, static_cast<unsigned long long>(trial.bytes), trial.figures.psnr_db,
+               trial.figures.p99, remark);
+}
+
+/// What was tried, what it came to, and what a step up or down would cost.
+void print_choice(const CodingChoice& choice, const CodingOptions& coding) {
+  std::fprintf(stderr, "light and pose of all segments, by what was tried:\n");
+  for (std::size_t i = 0; i < choice.reports.size(); ++i) {
+    const CandidateReport& report = choice.reports[i];
+    if (report.outcome == CandidateReport::Outcome::kUnavailable) {
+      std::fprintf(stderr, "  %-12s %s\n", report.name.c_str(), outcome_name(report));
+    } else {
+      print_trial(report.name, report.best, i == choice.candidate ? "taken" : outcome_name(report));
+    }
+  }
+  for (const CodingTrial& trial : choice.coarser_and_finer)
+    print_trial(coding.codec, trial, trial.crf > choice.trial.crf ? "coarser" : "finer");
+}
+
 void print_summary(const BakeSummary& s) {
   std::fprintf(stderr, "%s: %s, %llu frames, order %d, %dx%d; %s, %d charts, %.0f %% covered\n",
                s.output.c_str(), s.clip.c_str(), static_cast<unsigned long long>(s.frames), s.order,
                s.width, s.height,
                s.atlas.set < 0 ? "unwrapped" : ("UV set " + std::to_string(s.atlas.set)).c_str(),
                s.atlas.charts, 100 * s.atlas.coverage);
-  if (s.relit_psnr_db) std::fprintf(stderr, "rate factor %g: %.2f dB\n", s.crf, *s.relit_psnr_db);
+  if (s.choice) print_choice(*s.choice, s.coding);
   std::fprintf(
       stderr, "%llu bytes: light %llu, pose %llu, meshes %llu, images %llu\n",
       static_cast<unsigned long long>(s.bytes), static_cast<unsigned long long>(s.video_bytes),

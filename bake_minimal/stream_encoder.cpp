@@ -13,9 +13,7 @@ namespace {
 /// The library keeps its format version in a global and newer releases default to newer ones.
 void fix_format() {
   static std::once_flag once;
-  std::call_once(once, [] {
-    meshopt_encodeIndexVersion(1);
-  });
+  std::call_once(once, [] { meshopt_encodeIndexVersion(1); });
 }
 
 }  // namespace

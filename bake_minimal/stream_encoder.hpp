@@ -17,9 +17,9 @@ namespace relit::bake {
 
 /// What the prediction of a vertex stream leaves, in planes of bytes, as one zstd frame. `bytes`
 /// holds whole vertices of `form.stride` bytes, those with a twin included.
-[[nodiscard]] std::vector<std::uint8_t> encode_vertex_stream(
-    std::span<const std::uint8_t> bytes, const decoders::VertexStreamForm& form,
-    const decoders::VertexLinks& links);
+[[nodiscard]] std::vector<std::uint8_t> encode_vertex_stream(std::span<const std::uint8_t> bytes,
+                                                             const decoders::VertexStreamForm& form,
+                                                             const decoders::VertexLinks& links);
 
 /// The stream of twins, decoders::kNoTwin for none. The distance from one to the next, modulo 2^16,
 /// must not be 2^15.

@@ -121,10 +121,9 @@ Status validate_streams(const std::vector<VertexStream>& streams) {
   const auto of = [&](Semantic s) { return count[static_cast<std::size_t>(s)]; };
   RELIT_REQUIRE(of(Semantic::kPosition) == 1, "a mesh needs exactly one position stream");
   RELIT_REQUIRE(of(Semantic::kLightMapUv) == 1, "a mesh needs exactly one light-map UV stream");
-  RELIT_REQUIRE(
-      of(Semantic::kNormal) <= 1 && of(Semantic::kAlbedoUv) <= 1 && of(Semantic::kColor) <= 1 &&
-          of(Semantic::kTwin) <= 1,
-      "normals, albedo UVs, colours and twins have at most one stream each");
+  RELIT_REQUIRE(of(Semantic::kNormal) <= 1 && of(Semantic::kAlbedoUv) <= 1 &&
+                    of(Semantic::kColor) <= 1 && of(Semantic::kTwin) <= 1,
+                "normals, albedo UVs, colours and twins have at most one stream each");
   RELIT_REQUIRE(of(Semantic::kJoints) <= 2 && of(Semantic::kJoints) == of(Semantic::kWeights),
                 "joints and weights need as many streams, at most two of each");
   return {};

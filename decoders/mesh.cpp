@@ -37,7 +37,8 @@ std::string place(const MeshRecord& record) {
 /// the low ones of every component, then the high ones.
 Result<std::vector<std::uint16_t>> decode_values(const std::vector<std::uint8_t>& bytes,
                                                  const VertexStreamForm& form,
-                                                 const VertexLinks& links, const std::string& what) {
+                                                 const VertexLinks& links,
+                                                 const std::string& what) {
   const std::size_t count = links.of_vertices.size();
   const std::size_t stored = links.stored(form);
   const std::size_t components = form.components();
@@ -93,7 +94,8 @@ glm::vec3 decode_octahedral(std::int8_t ex, std::int8_t ey) {
 /// The twins of a mesh: 0 for none, else 1 more than the folded distance from the last one.
 Result<std::vector<std::uint16_t>> decode_twins(const VertexStream& stream, std::size_t count,
                                                 const std::string& what) {
-  RELIT_ASSIGN(const std::vector<std::uint8_t> planes, inflate_exact(stream.bytes, 2 * count, what));
+  RELIT_ASSIGN(const std::vector<std::uint8_t> planes,
+               inflate_exact(stream.bytes, 2 * count, what));
   std::vector<std::uint16_t> twins(count, kNoTwin);
   std::uint16_t last = 0;
   for (std::size_t v = 0; v < count; ++v) {
@@ -283,9 +285,9 @@ class StreamDecoder {
       std::vector<glm::vec3>& offsets = mesh_.morph_targets.emplace_back(count_);
       for (std::size_t v = 0; v < count_; ++v) {
         const std::uint16_t* p = &values[v * 4];
-        offsets[v] = scale * glm::vec3(static_cast<std::int16_t>(p[0]),
-                                       static_cast<std::int16_t>(p[1]),
-                                       static_cast<std::int16_t>(p[2]));
+        offsets[v] =
+            scale * glm::vec3(static_cast<std::int16_t>(p[0]), static_cast<std::int16_t>(p[1]),
+                              static_cast<std::int16_t>(p[2]));
       }
     }
     return {};

@@ -20,8 +20,8 @@ constexpr std::array<VertexStreamForm, 8> kForms{{
     {"weights", 4, 1, false, true, Prediction::kWeights},
     {"twin", 2, 2, false, false, Prediction::kNone},
 }};
-constexpr VertexStreamForm kMorphTarget{
-    "morph target", 8, 2, true, true, Prediction::kParallelogram};
+constexpr VertexStreamForm kMorphTarget{"morph target", 8,    2,
+                                        true,           true, Prediction::kParallelogram};
 
 /// How many triangles before a vertex's own are searched for the far corner.
 constexpr std::size_t kFarTriangles = 16;

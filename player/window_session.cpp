@@ -77,7 +77,11 @@ double WindowSession::idle_s() const {
 
 double WindowSession::overlay_period_s() const {
   // A message fades; numbers and what is waited for are read.
-  return message_until_s_ > now_s_ ? 1.0 / 60 : 0.25;
+  if (message_until_s_ > now_s_) return 1.0 / 60;
+  // A source that stalls says nothing new.
+  const bool by_itself = opening() && !statistics_ && controls_until_s_ <= now_s_;
+  if (by_itself && opening_text_ == opening_text()) return std::numeric_limits<double>::infinity();
+  return 0.25;
 }
 
 std::string WindowSession::light_text() const {
@@ -105,6 +109,7 @@ std::string WindowSession::planes_text() const {
 void WindowSession::fill(OverlayModel& model, WindowStatistics& statistics) const {
   model.keys = keys_;
   model.message_visibility = 0, model.message_is_error = false;
+  opening_text_.clear();
   if (message_until_s_ > now_s_) {
     model.message = message_, model.message_is_error = message_is_error_;
     model.message_visibility = static_cast<float>((message_until_s_ - now_s_) / kMessageFade_s);

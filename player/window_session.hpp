@@ -135,7 +135,7 @@ class WindowSession {
   std::unique_ptr<Opening> opening_;
   std::optional<Background<LoadedLight>> lighting_;
   std::string lighting_name_;
-  mutable std::string opening_text_;  // lent to the overlay
+  mutable std::string opening_text_;  // lent to the overlay; empty where it does not show
 
   Requests requests_;
   bool keys_ = false, statistics_ = false, changed_ = true;

@@ -38,8 +38,8 @@ Drawn drawn_mesh(std::mt19937& random, bool with_twins) {
   const std::size_t count = 3 + draw(random, 60);
   for (std::size_t i = 0; i < 6 * count; ++i) {
     // Mostly near the last ones, so that triangles share edges.
-    const std::size_t at = i < 3 || draw(random, 4) == 0 ? draw(random, count)
-                                                         : out.indices[i - 1 - draw(random, 3)];
+    const std::size_t at =
+        i < 3 || draw(random, 4) == 0 ? draw(random, count) : out.indices[i - 1 - draw(random, 3)];
     out.indices.push_back(static_cast<std::uint16_t>(at));
   }
   if (with_twins) out.twins.assign(count, decoders::kNoTwin);
@@ -89,11 +89,11 @@ TEST_CASE("vertex streams of any values and any triangles come back to the bit")
     copy_twins(drawn.record.morph_targets[0].bytes, 8, drawn.twins);
     for (std::size_t i = 0; i < record.streams.size(); ++i) {
       VertexStream& s = record.streams[i];
-      s.bytes = encode_vertex_stream(drawn.record.streams[i].bytes, decoders::form_of(s.semantic),
-                                     links);
+      s.bytes =
+          encode_vertex_stream(drawn.record.streams[i].bytes, decoders::form_of(s.semantic), links);
     }
-    record.morph_targets[0].bytes = encode_vertex_stream(
-        drawn.record.morph_targets[0].bytes, decoders::morph_target_form(), links);
+    record.morph_targets[0].bytes = encode_vertex_stream(drawn.record.morph_targets[0].bytes,
+                                                         decoders::morph_target_form(), links);
     if (!drawn.twins.empty())
       record.streams.push_back({Semantic::kTwin, 2, {}, {1, 1, 1}, encode_twins(drawn.twins)});
 
@@ -134,14 +134,17 @@ TEST_CASE("matching slots moves influences and changes none") {
   const decoders::VertexLinks links = decoders::link_vertices(indices, kVertices, {});
   std::vector<VertexStream> streams;
   for (int s = 0; s < 2; ++s) {
-    streams.push_back({Semantic::kJoints, 8, {}, {1, 1, 1}, std::vector<std::uint8_t>(8 * kVertices)});
-    streams.push_back({Semantic::kWeights, 4, {}, {1, 1, 1}, std::vector<std::uint8_t>(4 * kVertices)});
+    streams.push_back(
+        {Semantic::kJoints, 8, {}, {1, 1, 1}, std::vector<std::uint8_t>(8 * kVertices)});
+    streams.push_back(
+        {Semantic::kWeights, 4, {}, {1, 1, 1}, std::vector<std::uint8_t>(4 * kVertices)});
   }
   const auto influences = [&](std::size_t v) {
     std::map<int, int> out;
     for (std::size_t i = 0; i < 8; ++i) {
       const int weight = streams[2 * (i / 4) + 1].bytes[4 * v + i % 4];
-      if (weight > 0) out[static_cast<int>(word(streams[2 * (i / 4)].bytes, 4 * v + i % 4))] += weight;
+      if (weight > 0)
+        out[static_cast<int>(word(streams[2 * (i / 4)].bytes, 4 * v + i % 4))] += weight;
     }
     return out;
   };
@@ -149,7 +152,8 @@ TEST_CASE("matching slots moves influences and changes none") {
     const std::size_t used = 1 + draw(random, 8);
     for (std::size_t i = 0; i < used; ++i) {
       streams[2 * (i / 4)].bytes[8 * v + 2 * (i % 4)] = static_cast<std::uint8_t>((v / 8 + i) % 9);
-      streams[2 * (i / 4) + 1].bytes[4 * v + i % 4] = static_cast<std::uint8_t>(1 + draw(random, 30));
+      streams[2 * (i / 4) + 1].bytes[4 * v + i % 4] =
+          static_cast<std::uint8_t>(1 + draw(random, 30));
     }
   }
   std::vector<std::map<int, int>> before;
@@ -166,8 +170,8 @@ TEST_CASE("matching slots keeps joints where the vertex before has them") {
                                              7, 0, 0, 0, 0, 0, 0, 0}},
       {Semantic::kWeights, 4, {}, {1, 1, 1}, {155, 100, 0, 0, 200, 55, 0, 0, 255, 0, 0, 0}}};
   match_influence_slots(streams, links);
-  CHECK(streams[0].bytes == std::vector<std::uint8_t>{3, 0, 5, 0, 0, 0, 0, 0, 3, 0, 5, 0, 0, 0, 0, 0,
-                                                      3, 0, 5, 0, 0, 0, 7, 0});
+  CHECK(streams[0].bytes == std::vector<std::uint8_t>{3, 0, 5, 0, 0, 0, 0, 0, 3, 0, 5, 0,
+                                                      0, 0, 0, 0, 3, 0, 5, 0, 0, 0, 7, 0});
   CHECK(streams[1].bytes == std::vector<std::uint8_t>{155, 100, 0, 0, 55, 200, 0, 0, 0, 0, 0, 255});
 }
 

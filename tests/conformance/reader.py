@@ -133,7 +133,8 @@ SOUND = {
         d["index_count"] % 3 == 0 and n["position"] == n["lightmap_uv"] == 1
         and n["joints"] == n["weights"] <= 2
         and max(n["normal"], n["albedo_uv"], n["color"], n["twin"]) <= 1),
-    "stream": lambda d: d["stride"] == {"position": 8, "joints": 8, "twin": 2}.get(d["semantic"], 4),
+    "stream": lambda d: (
+        d["stride"] == {"position": 8, "joints": 8, "twin": 2}.get(d["semantic"], 4)),
     "SKEL": lambda d: (all(n["parent"] < i for i, n in enumerate(d["nodes"]))
                        and all(joint["node"] < len(d["nodes"]) for joint in d["palette"])),
     "POSE": lambda d: distinct([r["node"] for r in d["rest"]]) and (

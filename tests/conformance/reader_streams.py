@@ -24,7 +24,7 @@ def meshopt_indices(raw, count):
     raw, size_t = unzstd(raw, 1, 8 * count + 4096), ctypes.c_size_t
     out, call = ctypes.create_string_buffer(4 * count), ctypes.CDLL("libmeshoptimizer.so")
     need(raw[:1] == b"\xe1" and not call.meshopt_decodeIndexBuffer(
-        out, size_t(count), size_t(4), raw, size_t(len(raw))), "indices: another format, or damaged")
+        out, size_t(count), size_t(4), raw, size_t(len(raw))), "indices: damaged")
     return list(struct.unpack(f"<{count}I", out.raw))
 
 def read_twins(raw, count):

@@ -68,11 +68,21 @@ void add_meshes(Vectors& vectors) {
   });
   mesh(vectors, "mesh-twin-later", "a twin that does not come before its vertex", [](M& m) {
     // Folded 4 is 2 more than 0, of vertex 2.
-    m.streams.push_back({Semantic::kTwin, 2, {}, {1, 1, 1}, bake::deflate(std::vector<std::uint8_t>{0, 0, 5, 0, 0, 0, 0, 0})});
+    m.streams.push_back({Semantic::kTwin,
+                         2,
+                         {},
+                         {1, 1, 1},
+                         bake::deflate(std::vector<std::uint8_t>{0, 0, 5, 0, 0, 0, 0, 0})});
   });
-  mesh(vectors, "mesh-twin-unused", "streams of four points beside a stream of twins for three", [](M& m) {
-    m.streams.push_back({Semantic::kTwin, 2, {}, {1, 1, 1}, bake::encode_twins(std::vector<std::uint16_t>{kNone, kNone, kNone, 2})});
-  });
+  mesh(vectors, "mesh-twin-unused", "streams of four points beside a stream of twins for three",
+       [](M& m) {
+         m.streams.push_back(
+             {Semantic::kTwin,
+              2,
+              {},
+              {1, 1, 1},
+              bake::encode_twins(std::vector<std::uint16_t>{kNone, kNone, kNone, 2})});
+       });
   mesh(vectors, "mesh-beyond-bounds", "a scale that leads beyond 10^9",
        [](M& m) { m.streams[0].scale[0] = 1e6f; });
   from_draft(vectors, "image-garbage", "an image that is no PNG", faulty({"DECODE_IMAGE"}),

@@ -131,7 +131,8 @@ void add_mesh(Vectors& vectors) {
                   [](Draft& d) { d.meshes[0].streams[0].semantic = Semantic{8}; }},
                  {"mesh-two-twins", "two streams of twins", "MESH_CORRUPT",
                   [](Draft& d) {
-                    d.meshes[0].streams.resize(d.meshes[0].streams.size() + 2, {Semantic::kTwin, 2, {}, {1, 1, 1}, {1}});
+                    d.meshes[0].streams.resize(d.meshes[0].streams.size() + 2,
+                                               {Semantic::kTwin, 2, {}, {1, 1, 1}, {1}});
                   }},
                  {"mesh-streams-limit", "seventeen streams", "MESH_LIMIT",
                   [](Draft& d) { d.meshes[0].streams.resize(17, d.meshes[0].streams[0]); }},

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Records that contradict each other.
+#include <algorithm>
+
 #include "container/base/limits.hpp"
 #include "container/record_codec.hpp"
 #include "tests/conformance/making.hpp"
@@ -97,6 +99,8 @@ void add_dangling(Vectors& vectors) {
                           const std::function<void(MeshRecord&)>& enlarge) {
     from_static_draft(vectors, name, description, "REF_LIMIT", [=](Draft& d) {
       enlarge(d.meshes[0]);
+      const auto targets = static_cast<std::uint32_t>(d.meshes[0].morph_targets.size());
+      d.skeleton->morph_weight_count = std::max(d.skeleton->morph_weight_count, targets);
       for (std::uint32_t id = 1; id < count; ++id) {
         d.meshes.push_back(d.meshes[0]);
         d.meshes.back().id = 1000 + id;
