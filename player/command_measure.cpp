@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: MIT
+#include <unistd.h>
+
+#include <cstdio>
+
+#include "container/byte_sink.hpp"
+#include "player/command.hpp"
+#include "player/measure_run.hpp"
+#include "player/measure_text.hpp"
+
+namespace relit::player {
+namespace {
+
+struct Arguments {
+  MeasureRun run;
+  std::string csv, json, html;
+};
+
+// Opened first, so that minutes are not spent for a place that cannot be written.
+struct Outputs {
+  std::unique_ptr<container::FileSink> csv, json, html;
+
+  static Result<Outputs> create(const Arguments& arguments) {
+    Outputs outputs;
+    const auto open = [](const std::string& path,
+                         std::unique_ptr<container::FileSink>& sink) -> Status {
+      if (path.empty()) return {};
+      RELIT_ASSIGN(sink, container::FileSink::create(path));
+      return {};
+    };
+    RELIT_TRY(open(arguments.csv, outputs.csv));
+    RELIT_TRY(open(arguments.json, outputs.json));
+    RELIT_TRY(open(arguments.html, outputs.html));
+    return outputs;
+  }
+};
+
+Status write(const std::unique_ptr<container::FileSink>& sink, const std::string& text) {
+  RELIT_TRY(sink->write({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}));
+  return sink->commit();
+}
+
+Status write_all(const Outputs& outputs, const MeasureReport& report) {
+  if (outputs.csv) RELIT_TRY(write(outputs.csv, measure_csv(report)));
+  if (outputs.json) {
+    RELIT_TRY(write(
+        outputs.json,
+        measure_json(report).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
+            "\n"));
+  }
+  return {};
+}
+
+int run(Arguments arguments) {
+  const auto outputs = Outputs::create(arguments);
+  if (!outputs) return report(outputs.error());
+  const bool shows = isatty(STDERR_FILENO) != 0;
+  arguments.run.progress = [shows](const std::string& what) {
+    if (shows) std::fprintf(stderr, "\r%s\033[K", what.c_str());
+  };
+  arguments.run.warn = &warn;
+  arguments.run.pictures = !arguments.html.empty();
+  const auto measured = measure(arguments.run);
+  if (shows) std::fprintf(stderr, "\r\033[K");
+  if (!measured) return report(measured.error());
+  std::fputs(measure_table(*measured).c_str(), stdout);
+  if (const Status written = write_all(*outputs, *measured); !written)
+    return report(written.error());
+  int status = kSuccess;
+  for (const MeasuredPoint& point : measured->points) {
+    if (point.lost_frames == 0 && point.scored()) continue;
+    if (status == kSuccess || point.impossible)
+      warn(point_label(*measured, point) + ": " +
+           (point.scored() ? std::to_string(point.lost_frames) + " frames are lost to damage"
+                           : point.failure));
+    if (point.scored() || !point.impossible) status = kWithLosses;
+  }
+  return status;
+}
+
+}  // namespace
+
+void add_measure(CommandLine& line) {
+  Options command =
+      line.add("measure", "size, error, time and memory of files and ways to play them");
+  const auto a = std::make_shared<Arguments>();
+  MeasureRun& r = a->run;
+  command.add("files", r.files, "one or more .relit files of one clip").required();
+  command.add("--reference", r.reference,
+              "what they are scored against: the .npy of relit-bake --reference, or a .relit; "
+              "without one the first file, all of it decoded");
+  command.add("--clip", r.clip, "by name or number");
+  command
+      .add("--lights", r.lights,
+           ".hdr, .exr or .json, in place of the 16 standard lights; repeatable")
+      .expected(1, 1);
+  command.add("--frames", r.frames, "score so many, evenly spread; 0: all").shows_default();
+  command.add("--planes", r.sweep.planes,
+              "list of numbers, all, layers (the end of each): drops planes from the end");
+  command.add("--composite", r.sweep.composite, "list of cpu, texture, fused");
+  command.add("--backend", r.sweep.backend,
+              "list of egl, egl-es2, egl-es2-mediump, osmesa: of the paths on the GPU");
+  command.add("--threads", r.sweep.threads, "list of decode threads");
+  command.add("--every", r.sweep.every, "list of N: one frame in N is decoded, the others blended");
+  command.flag(
+      "--product", r.sweep.product,
+      "all combinations of the lists; otherwise the first values, and each list by itself");
+  command.add("--repeats", r.meter.repeats, "of decoding the clip, for the median")
+      .range(1, 99)
+      .shows_default();
+  command.add("--picture-frame", r.picture_frame, "whose pictures the page shows");
+  command.add("--csv", a->csv, "write the points as comma-separated values");
+  command.add("--json", a->json, "write everything as JSON");
+  command.add("--html", a->html, "write one page with plots and pictures");
+  command.footer(
+      "With one file, lists that are not given vary every knob; with several they hold the best\n"
+      "quality, and the files are what is compared. MEASURE.md says what the columns mean.\n"
+      "Examples:\n"
+      "  relit measure man.relit\n"
+      "  relit measure man-*.relit --reference man.npy --csv man.csv --html man.html\n"
+      "  relit measure man.relit --planes all,12,6,1 --composite cpu,texture --product");
+  command.runs([a] { return run(*a); });
+}
+
+}  // namespace relit::player
