@@ -2,9 +2,11 @@
 #include <unistd.h>
 
 #include <cstdio>
+#include <set>
 
 #include "container/byte_sink.hpp"
 #include "player/command.hpp"
+#include "player/measure_html.hpp"
 #include "player/measure_run.hpp"
 #include "player/measure_text.hpp"
 
@@ -67,14 +69,15 @@ int run(Arguments arguments) {
   if (const Status written = write_all(*outputs, *measured); !written)
     return report(written.error());
   int status = kSuccess;
+  std::set<std::string> said;
   for (const MeasuredPoint& point : measured->points) {
-    if (point.lost_frames == 0 && point.scored()) continue;
-    if (status == kSuccess || point.impossible)
-      warn(point_label(*measured, point) + ": " +
-           (point.scored() ? std::to_string(point.lost_frames) + " frames are lost to damage"
-                           : point.failure));
-    if (point.scored() || !point.impossible) status = kWithLosses;
+    const std::string& file = measured->files[point.file].path;
+    if (point.lost_frames > 0) said.insert(file + ": frames are lost to damage");
+    if (!point.scored())
+      said.insert(file + ": " + point_label(*measured, point) + ": " + point.failure);
+    if (point.lost_frames > 0 || (!point.scored() && !point.impossible)) status = kWithLosses;
   }
+  for (const std::string& sentence : said) warn(sentence);
   return status;
 }
 
@@ -108,7 +111,8 @@ void add_measure(CommandLine& line) {
   command.add("--repeats", r.meter.repeats, "of decoding the clip, for the median")
       .range(1, 99)
       .shows_default();
-  command.add("--picture-frame", r.picture_frame, "whose pictures the page shows");
+  command.add("--picture-frame", r.picture_frame,
+              "whose pictures the page shows: the nearest that is scored");
   command.add("--csv", a->csv, "write the points as comma-separated values");
   command.add("--json", a->json, "write everything as JSON");
   command.add("--html", a->html, "write one page with plots and pictures");

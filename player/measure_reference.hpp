@@ -39,7 +39,7 @@ class MeasureReference {
   /// in memory. Errors, with path and frame: kInvalid for numbers that are not finite; those of
   /// reading.
   Status load(std::uint64_t count);
-  /// The ticks of the frames that are loaded.
+  /// The ticks of the frames that are loaded, ascending.
   [[nodiscard]] const std::vector<std::uint64_t>& ticks() const { return ticks_; }
   /// [coefficients][3][H][W] of the frame ticks()[i].
   [[nodiscard]] std::span<const float> transfer(std::size_t i) const { return frames_[i]; }

@@ -2,11 +2,13 @@
 #include "player/measure_run.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "decoders/coverage.hpp"
 #include "player/light.hpp"
 #include "player/measure_file.hpp"
 #include "player/measure_machine.hpp"
+#include "player/measure_pictures.hpp"
 
 namespace relit::player {
 namespace {
@@ -74,6 +76,21 @@ void describe_reference(const MeasureReference& reference, MeasureReport& report
   report.scored_frames = reference.ticks();
 }
 
+// The scored frame nearest to the one asked for; by default an odd one a third into the clip, which
+// is blended where frames are left out.
+std::uint64_t picture_frame(const MeasureRun& run, const MeasureReference& reference) {
+  const std::uint64_t wanted = run.picture_frame >= 0
+                                   ? static_cast<std::uint64_t>(run.picture_frame)
+                                   : reference.shape().frames / 3;
+  const auto distance = [&](std::uint64_t tick) {
+    const std::uint64_t apart = tick > wanted ? tick - wanted : wanted - tick;
+    return std::pair(run.picture_frame < 0 && tick % 2 == 0, apart);
+  };
+  return *std::min_element(
+      reference.ticks().begin(), reference.ticks().end(),
+      [&](std::uint64_t a, std::uint64_t b) { return distance(a) < distance(b); });
+}
+
 }  // namespace
 
 Result<MeasureReport> measure(const MeasureRun& run) {
@@ -102,6 +119,15 @@ Result<MeasureReport> measure(const MeasureRun& run) {
     RELIT_TRY(meter.measure(report.points[i]));
   }
   mark_fronts(report.points);
+  if (!run.pictures) return report;
+  if (backends.empty()) {
+    run.warn("there is no GL on this machine: the page goes without pictures");
+    return report;
+  }
+  constexpr std::size_t kPictures = 8;
+  run.progress("drawing pictures");
+  report.picture_frame = picture_frame(run, reference);
+  RELIT_TRY(add_pictures(reference, lights, backends.front(), kPictures, report));
   return report;
 }
 

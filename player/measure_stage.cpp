@@ -46,12 +46,9 @@ Status MeasureStage::draw(Relighter& light) {
   return light.draw(character_->renderer(), view_);
 }
 
-Status MeasureStage::draw(std::span<const float> light_map) {
-  if (!uploader_) {
-    RELIT_ASSIGN(uploader_, gles::LightMapUploader::create(device(), clip_.model().width,
-                                                           clip_.model().height));
-  }
-  RELIT_ASSIGN(const gles::LightMap map, uploader_->upload(light_map, 1));
+Status MeasureStage::draw(std::span<const float> light_map, int width, int height) {
+  RELIT_ASSIGN(auto uploader, gles::LightMapUploader::create(device(), width, height));
+  RELIT_ASSIGN(const gles::LightMap map, uploader.upload(light_map, 1));
   framebuffer_->bind();
   return character_->renderer().draw(view_, map);
 }

@@ -35,22 +35,19 @@ class MeasureStage {
   void expose(const decoders::Light& light);
   /// Puts the meshes where they are at a moment.
   Status pose(const FrameMix& mix);
-  /// Draws with a relighter's light of the moment, or with a light map that is uploaded, [3][H][W]
-  /// of the clip's size.
+  /// Draws with a relighter's light of the moment, or with a light map that is uploaded,
+  /// [3][height][width].
   Status draw(Relighter& light);
-  Status draw(std::span<const float> light_map);
+  Status draw(std::span<const float> light_map, int width, int height);
   /// The picture that was drawn, RGBA, straight alpha, transparent beside the character.
   Result<std::vector<std::uint8_t>> read();
 
  private:
-  MeasureStage(GlBackend gl, const ClipReader& clip)
-      : gl_(std::move(gl)), clip_(clip), posed_(clip.meshes()) {}
+  MeasureStage(GlBackend gl, const ClipReader& clip) : gl_(std::move(gl)), posed_(clip.meshes()) {}
 
   GlBackend gl_;
-  const ClipReader& clip_;
   std::unique_ptr<Character> character_;
   std::optional<gles::Framebuffer> framebuffer_;
-  std::optional<gles::LightMapUploader> uploader_;
   PosedMeshes posed_;
   decoders::Pose blended_;
   gles::View view_;
