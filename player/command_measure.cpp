@@ -50,6 +50,7 @@ Status write_all(const Outputs& outputs, const MeasureReport& report) {
         measure_json(report).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
             "\n"));
   }
+  if (outputs.html) RELIT_TRY(write(outputs.html, measure_html(report)));
   return {};
 }
 

@@ -117,7 +117,7 @@ std::string memory(const MeasureReport& report) {
     });
     if (!same) bars.push_back(bar);
   }
-  return wide_and_narrow(bar_plot(bars, 1000, "MiB of memory"),
+  return wide_and_narrow(bar_plot(bars, 1040, "MiB of memory"),
                          bar_plot(bars, 340, "MiB of memory")) +
          "<ul class=\"legend\"><li><span class=\"swatch\" style=\"background:var(--s0)\"></span>"
          "heap</li><li><span class=\"swatch\" "
@@ -139,8 +139,9 @@ std::string pictures(const MeasureReport& report) {
                   ", each drawn alike but for its light map. Beside it, how far it is from the "
                   "reference: red ink, " +
                   fixed(report.difference_gain, 0) + " times the difference of displayed values.");
-  out += "<div class=\"pictures\">\n<figure>" + image(report.reference_png, "the reference") +
-         "<figcaption><strong>Reference</strong>" + html_escape(file_name(report.reference)) +
+  out += "<div class=\"pictures\">\n<figure><div class=\"pair\">" +
+         image(report.reference_png, "the reference") +
+         "</div><figcaption><strong>Reference</strong>" + html_escape(file_name(report.reference)) +
          "</figcaption></figure>\n";
   for (const MeasuredPicture& picture : report.pictures) {
     const MeasuredPoint& point = report.points[picture.point];

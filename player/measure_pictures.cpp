@@ -10,7 +10,7 @@
 namespace relit::player {
 namespace {
 
-constexpr int kSide = 400;  // pixels
+constexpr int kSide = 800;  // pixels of what is drawn; what is kept of it is cropped
 using Map = std::vector<float>;
 
 // Threads cannot be seen, and what a fused sum gives is read as the same sum in texture space.
@@ -57,6 +57,39 @@ struct Lit {
   Map map;
   int width = 0, height = 0;
 };
+
+// A rectangle of a picture of kSide².
+struct Crop {
+  int x0 = kSide, y0 = kSide, x1 = 0, y1 = 0;
+  [[nodiscard]] bool empty() const { return x0 >= x1; }
+};
+
+// What is not transparent, and some room around it.
+Crop crop_of(std::span<const std::uint8_t> rgba) {
+  Crop crop;
+  for (int y = 0; y < kSide; ++y) {
+    for (int x = 0; x < kSide; ++x) {
+      if (rgba[static_cast<std::size_t>(4 * (y * kSide + x) + 3)] == 0) continue;
+      crop.x0 = std::min(crop.x0, x), crop.x1 = std::max(crop.x1, x + 1);
+      crop.y0 = std::min(crop.y0, y), crop.y1 = std::max(crop.y1, y + 1);
+    }
+  }
+  constexpr int kRoom = kSide / 50;
+  if (crop.empty()) return {0, 0, kSide, kSide};
+  return {std::max(crop.x0 - kRoom, 0), std::max(crop.y0 - kRoom, 0),
+          std::min(crop.x1 + kRoom, kSide), std::min(crop.y1 + kRoom, kSide)};
+}
+
+Result<std::vector<std::uint8_t>> encode(std::span<const std::uint8_t> rgba, const Crop& crop) {
+  const int width = crop.x1 - crop.x0, height = crop.y1 - crop.y0;
+  std::vector<std::uint8_t> kept;
+  for (int y = crop.y0; y < crop.y1; ++y) {
+    const auto row = rgba.subspan(static_cast<std::size_t>(4 * (y * kSide + crop.x0)),
+                                  static_cast<std::size_t>(4 * width));
+    kept.insert(kept.end(), row.begin(), row.end());
+  }
+  return decoders::encode_png(width, height, kept);
+}
 
 }  // namespace
 
@@ -133,14 +166,16 @@ Status add_pictures(const MeasureReference& reference, std::span<const MeasureLi
   };
   RELIT_TRY(on_own_thread(draw));
   report.picture_light = lights.front().name;
-  RELIT_ASSIGN(report.reference_png, decoders::encode_png(kSide, kSide, pictures.front()));
+  // All are posed alike.
+  const Crop crop = crop_of(pictures.front());
+  RELIT_ASSIGN(report.reference_png, encode(pictures.front(), crop));
   std::vector<std::uint8_t> difference(pictures.front().size());
   for (std::size_t i = 0; i < chosen.size(); ++i) {
     MeasuredPicture& picture = report.pictures.emplace_back();
     picture.point = chosen[i];
-    RELIT_ASSIGN(picture.png, decoders::encode_png(kSide, kSide, pictures[i + 1]));
+    RELIT_ASSIGN(picture.png, encode(pictures[i + 1], crop));
     draw_difference(pictures.front(), pictures[i + 1], report.difference_gain, difference);
-    RELIT_ASSIGN(picture.difference_png, decoders::encode_png(kSide, kSide, difference));
+    RELIT_ASSIGN(picture.difference_png, encode(difference, crop));
   }
   return {};
 }

@@ -49,7 +49,7 @@ std::vector<double> log_ticks(double low, double high) {
       if (value >= low * (1 - 1e-9) && value <= high * (1 + 1e-9)) ticks.push_back(value);
     }
   }
-  return ticks;
+  return ticks.size() < 3 ? linear_ticks(low, high, 5) : ticks;
 }
 
 std::vector<double> linear_ticks(double low, double high, int count) {
@@ -116,12 +116,13 @@ struct Box {
   }
 };
 
-constexpr double kFont = 12, kMark = 4.5;
+// Of the page's fonts the widest has letters of about that width, on average.
+constexpr double kFont = 12, kLetter = 0.6 * kFont, kMark = 4.5;
 
 double text_width(const std::string& text) {
   const auto letters =
       std::count_if(text.begin(), text.end(), [](char c) { return (c & 0xC0) != 0x80; });
-  return 0.56 * kFont * static_cast<double>(letters);
+  return kLetter * static_cast<double>(letters);
 }
 
 // Where points, axes and labels lie, in pixels.
@@ -320,7 +321,7 @@ namespace {
 std::string fitted(const std::string& text, double width) {
   if (text_width(text) <= width) return text;
   std::string out = text;
-  while (!out.empty() && text_width(out) + 0.56 * kFont > width) {
+  while (!out.empty() && text_width(out) + kLetter > width) {
     while (out.size() > 1 && (out.back() & 0xC0) == 0x80) out.pop_back();
     out.pop_back();
   }

@@ -26,7 +26,7 @@ struct PlotPoint {
 constexpr int kPlotSeries = 6;
 
 struct PlotOptions {
-  int width = 720, height = 420;
+  int width = 1040, height = 460;
   std::string x_title, y_title;
   /// What lies above is drawn at the top edge, with an arrow: no eye sees it.
   double y_most = 60;
@@ -48,8 +48,8 @@ struct PlotBar {
 [[nodiscard]] std::string bar_plot(std::span<const PlotBar> bars, int width,
                                    const std::string& unit);
 
-/// 1, 2 and 5 times powers of ten within [low, high], at least two of them wherever there are; for
-/// logarithmic axes.
+/// 1, 2 and 5 times powers of ten within [low, high], for logarithmic axes; round steps where there
+/// are fewer than three of them.
 [[nodiscard]] std::vector<double> log_ticks(double low, double high);
 /// Round steps within [low, high], about `count` of them.
 [[nodiscard]] std::vector<double> linear_ticks(double low, double high, int count);

@@ -2,6 +2,7 @@
 #include "player/measure_run.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "decoders/coverage.hpp"
@@ -41,7 +42,8 @@ Result<double> peak_of(const MeasureReference& reference, const std::string& fil
   for (std::size_t i = 0; i < reference.ticks().size(); ++i)
     error.add_frame(reference.transfer(i), reference.transfer(i));
   const double peak = error.figures().peak;
-  if (peak > 0) return peak;
+  // The histogram's first step, of which 0 is a part, ends among the subnormal numbers.
+  if (peak >= static_cast<double>(std::numeric_limits<float>::min())) return peak;
   return fail(ErrorCode::kCorrupt,
               reference.path() + ": is black under all lights; nothing can be scored against it");
 }
