@@ -8,8 +8,8 @@
 #include <tuple>
 #include <utility>
 
-#include "bake_minimal/png_encoder.hpp"
 #include "bake_minimal/texture_math.hpp"
+#include "decoders/png_encoder.hpp"
 
 namespace relit::bake {
 namespace {
@@ -176,7 +176,7 @@ class MaterialPacker {
         }
       }
     }
-    RELIT_ASSIGN(image.encoded, encode_png(image.width, image.height, image.rgba));
+    RELIT_ASSIGN(image.encoded, decoders::encode_png(image.width, image.height, image.rgba));
     image.media_type = "image/png";
     use.image = store(key, std::move(image));
     return use;

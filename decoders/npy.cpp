@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "decoders/npy.hpp"
 
+#include <algorithm>
 #include <bit>
 #include <cerrno>
 #include <cstdio>
@@ -122,52 +123,73 @@ Result<std::vector<std::uint64_t>> parse_shape(const std::string& text, const st
 
 }  // namespace
 
-Result<NpyArray> read_npy(const std::filesystem::path& path) {
-  const std::string where = path.string();
-  std::unique_ptr<std::FILE, void (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"),
-                                                        [](std::FILE* f) { std::fclose(f); });
-  const auto io_error = [&] {
-    return fail(ErrorCode::kIo, where + ": cannot be read: " + std::strerror(errno));
-  };
-  if (!file) return io_error();
-  std::uint8_t start[10];
-  if (std::fread(start, sizeof start, 1, file.get()) != 1 || std::memcmp(start, kMagic, 6) != 0 ||
-      start[6] != 1) {
-    return fail(ErrorCode::kCorrupt, where + ": not a version 1 .npy file");
-  }
-  std::string text(static_cast<std::size_t>(start[8] | start[9] << 8), '\0');
-  if (text.empty() || std::fread(text.data(), text.size(), 1, file.get()) != 1) {
-    return fail(ErrorCode::kTruncated, where + ": ends in its header");
-  }
-  RELIT_ASSIGN(const std::string type, entry(text, "descr", where));
-  RELIT_ASSIGN(const std::string order, entry(text, "fortran_order", where));
-  RELIT_ASSIGN(const std::string shape, entry(text, "shape", where));
-  const bool bytes = type.find("|u1") != std::string::npos;
-  if ((!bytes && type.find("<f4") == std::string::npos) ||
-      order.find("False") == std::string::npos) {
-    return fail(ErrorCode::kUnsupported,
-                where + ": only C-ordered float32 and uint8 arrays are read");
-  }
-  NpyArray array;
-  RELIT_ASSIGN(array.shape, parse_shape(shape, where));
-  std::uint64_t elements = 1;
-  for (const std::uint64_t side : array.shape) elements *= side;
+Unexpected NpyReader::io_error() const {
+  return fail(ErrorCode::kIo, name_ + ": cannot be read: " + std::strerror(errno));
+}
+
+Result<NpyReader> NpyReader::open(const std::filesystem::path& path) {
+  NpyReader reader(File(std::fopen(path.c_str(), "rb"), [](std::FILE* f) { std::fclose(f); }),
+                   path.string());
+  if (!reader.file_) return reader.io_error();
+  RELIT_TRY(reader.read_header());
   std::error_code error;
   const std::uint64_t expected =
-      sizeof start + text.size() + elements * (bytes ? 1 : sizeof(float));
+      reader.header_bytes_ + reader.elements_ * (reader.bytes_ ? 1 : sizeof(float));
   if (std::filesystem::file_size(path, error) != expected || error) {
     return fail(ErrorCode::kTruncated,
-                where + ": its shape needs " + std::to_string(expected) + " bytes");
+                reader.name_ + ": its shape needs " + std::to_string(expected) + " bytes");
   }
-  array.values.resize(elements);
-  if (!bytes) {
-    if (std::fread(array.values.data(), sizeof(float), elements, file.get()) != elements)
+  return reader;
+}
+
+Status NpyReader::read_header() {
+  std::uint8_t start[10];
+  if (std::fread(start, sizeof start, 1, file_.get()) != 1 || std::memcmp(start, kMagic, 6) != 0 ||
+      start[6] != 1) {
+    return fail(ErrorCode::kCorrupt, name_ + ": not a version 1 .npy file");
+  }
+  std::string text(static_cast<std::size_t>(start[8] | start[9] << 8), '\0');
+  if (text.empty() || std::fread(text.data(), text.size(), 1, file_.get()) != 1) {
+    return fail(ErrorCode::kTruncated, name_ + ": ends in its header");
+  }
+  RELIT_ASSIGN(const std::string type, entry(text, "descr", name_));
+  RELIT_ASSIGN(const std::string order, entry(text, "fortran_order", name_));
+  RELIT_ASSIGN(const std::string shape, entry(text, "shape", name_));
+  bytes_ = type.find("|u1") != std::string::npos;
+  if ((!bytes_ && type.find("<f4") == std::string::npos) ||
+      order.find("False") == std::string::npos) {
+    return fail(ErrorCode::kUnsupported,
+                name_ + ": only C-ordered float32 and uint8 arrays are read");
+  }
+  RELIT_ASSIGN(shape_, parse_shape(shape, name_));
+  elements_ = 1;
+  for (const std::uint64_t side : shape_) elements_ *= side;
+  header_bytes_ = sizeof start + text.size();
+  return {};
+}
+
+Status NpyReader::read(std::uint64_t first, std::span<float> out) {
+  if (first > elements_ || out.size() > elements_ - first)
+    return fail(ErrorCode::kInvalid, name_ + ": elements that its shape does not hold");
+  const std::uint64_t at = header_bytes_ + first * (bytes_ ? 1 : sizeof(float));
+  if (fseeko(file_.get(), static_cast<off_t>(at), SEEK_SET) != 0) return io_error();
+  if (!bytes_) {
+    if (std::fread(out.data(), sizeof(float), out.size(), file_.get()) != out.size())
       return io_error();
-    return array;
+    return {};
   }
-  std::vector<std::uint8_t> raw(elements);
-  if (std::fread(raw.data(), 1, elements, file.get()) != elements) return io_error();
-  array.values.assign(raw.begin(), raw.end());
+  std::vector<std::uint8_t> raw(out.size());
+  if (std::fread(raw.data(), 1, raw.size(), file_.get()) != raw.size()) return io_error();
+  std::copy(raw.begin(), raw.end(), out.begin());
+  return {};
+}
+
+Result<NpyArray> read_npy(const std::filesystem::path& path) {
+  RELIT_ASSIGN(NpyReader reader, NpyReader::open(path));
+  NpyArray array;
+  array.shape = reader.shape();
+  array.values.resize(reader.elements());
+  RELIT_TRY(reader.read(0, array.values));
   return array;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <span>
@@ -40,13 +41,39 @@ class NpyWriter {
   std::uint64_t remaining_ = 0;
 };
 
-/// A float32 or uint8 array read whole. Values of uint8 arrays become floats.
+/// Reads a C-ordered float32 or uint8 array, any part of it at a time. Values of uint8 arrays
+/// become floats.
+class NpyReader {
+ public:
+  /// Errors: kIo, kCorrupt, kTruncated where the file is not as long as its shape says,
+  /// kUnsupported (another type or Fortran order), kLimit.
+  static Result<NpyReader> open(const std::filesystem::path& path);
+
+  [[nodiscard]] const std::vector<std::uint64_t>& shape() const { return shape_; }
+  [[nodiscard]] std::uint64_t elements() const { return elements_; }
+  /// The elements from `first` on. Errors: kIo, kInvalid beyond the end.
+  Status read(std::uint64_t first, std::span<float> out);
+
+ private:
+  using File = std::unique_ptr<std::FILE, void (*)(std::FILE*)>;
+  NpyReader(File file, std::string name) : file_(std::move(file)), name_(std::move(name)) {}
+  Status read_header();
+  [[nodiscard]] Unexpected io_error() const;
+
+  File file_;
+  std::string name_;
+  std::vector<std::uint64_t> shape_;
+  std::uint64_t elements_ = 0, header_bytes_ = 0;
+  bool bytes_ = false;
+};
+
+/// An array read whole.
 struct NpyArray {
   std::vector<std::uint64_t> shape;
   std::vector<float> values;
 };
 
-/// Errors: kIo, kCorrupt, kUnsupported (another type or Fortran order), kLimit.
+/// Errors: as NpyReader::open().
 Result<NpyArray> read_npy(const std::filesystem::path& path);
 
 }  // namespace relit::decoders

@@ -83,5 +83,6 @@ void add_remux(CommandLine& line);
 void add_concat(CommandLine& line);
 void add_export(CommandLine& line);
 void add_import(CommandLine& line);
+void add_measure(CommandLine& line);
 
 }  // namespace relit::player

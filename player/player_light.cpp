@@ -7,16 +7,12 @@
 #include "decoders/sh_constants.hpp"
 
 namespace relit::player {
-namespace {
 
-// Under which a white surface in that light is a little below white.
 float exposure_for(const decoders::Light& light) {
   const auto& rgb = light.sh.front();
   const double luminance = (0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]) * decoders::kBand0;
   return luminance > 0 ? static_cast<float>(0.8 / luminance) : 1.0f;
 }
-
-}  // namespace
 
 PlayerLight::PlayerLight(LightField field)
     : field_(std::move(field)), auto_exposure_(exposure_for(field_.mean())) {}

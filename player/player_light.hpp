@@ -10,6 +10,9 @@
 
 namespace relit::player {
 
+/// Radiance × this: a white surface in the mean of the light is a little below white. 1: no light.
+[[nodiscard]] float exposure_for(const decoders::Light& light);
+
 /// The light of a player: what was set, how it is turned, and what shines at the moment.
 class PlayerLight {
  public:
@@ -40,7 +43,7 @@ class PlayerLight {
   [[nodiscard]] double environment_rotation_rad() const { return rotation_rad_ + turn_rad_; }
   [[nodiscard]] double turn_rad() const { return turn_rad_; }
 
-  /// Radiance × this: a white surface in the mean of the whole light is a little below white.
+  /// exposure_for() the whole light.
   [[nodiscard]] float auto_exposure() const { return auto_exposure_; }
 
  private:

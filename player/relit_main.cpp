@@ -25,6 +25,7 @@ int main(int argc, char** argv) {
   add_concat(line);
   add_export(line);
   add_import(line);
+  add_measure(line);
   // The libraries' own messages say nothing that an error of ours does not.
   av_log_set_level(AV_LOG_QUIET);
   return line.run(argc, argv);

@@ -14,13 +14,18 @@ _relit() {
     return
   fi
   case $prev in
-    --light) _relit_files hdr exr json; return ;;
+    --light | --lights) _relit_files hdr exr json; return ;;
+    --reference) _relit_files npy relit; return ;;
     -o | --output) mapfile -t COMPREPLY < <(compgen -f -- "$cur"); return ;;
     --backend) mapfile -t COMPREPLY < <(compgen -W "egl egl-es2 egl-es2-mediump osmesa cpu" -- "$cur"); return ;;
     --tone-map) mapfile -t COMPREPLY < <(compgen -W "neutral filmic linear" -- "$cur"); return ;;
     --background) mapfile -t COMPREPLY < <(compgen -W "light sh none" -- "$cur"); return ;;
     --composite) mapfile -t COMPREPLY < <(compgen -W "auto cpu texture fused" -- "$cur"); return ;;
   esac
+  if [[ ${COMP_WORDS[1]} == measure && $prev == --@(csv|json|html) ]]; then
+    mapfile -t COMPREPLY < <(compgen -f -- "$cur")
+    return
+  fi
   if [[ $cur == -* ]]; then
     compopt +o filenames 2>/dev/null
     local options

@@ -2,8 +2,6 @@
 // relit_psnr REFERENCE.npy DECODED.npy MASK.npy: the figure by which lossy choices are compared, of
 // arrays (decoders/relit_error.hpp). A decoded array of lower order counts what it lacks as zero, a
 // smaller map is enlarged bilinearly.
-#include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <span>
 #include <vector>
@@ -25,24 +23,6 @@ Shape shape_of(const NpyArray& a) {
   return {s.at(0), s.at(1), s.at(3), s.at(4)};
 }
 
-// One axis of a bilinear enlargement whose texel centres line up.
-struct Tap {
-  std::size_t low, high;
-  double t;
-};
-
-std::vector<Tap> taps(std::size_t from, std::size_t to) {
-  std::vector<Tap> result(to);
-  for (std::size_t i = 0; i < to; ++i) {
-    const double x = std::clamp(
-        (static_cast<double>(i) + 0.5) * static_cast<double>(from) / static_cast<double>(to) - 0.5,
-        0.0, static_cast<double>(from - 1));
-    const auto low = std::min(static_cast<std::size_t>(x), from > 1 ? from - 2 : 0);
-    result[i] = {low, std::min(low + 1, from - 1), x - static_cast<double>(low)};
-  }
-  return result;
-}
-
 NpyArray load(const char* path) {
   auto array = relit::decoders::read_npy(path);
   if (!array) {
@@ -55,22 +35,12 @@ NpyArray load(const char* path) {
 // One frame of `decoded` at the reference's order and size.
 std::vector<float> conform(const NpyArray& decoded, const Shape& d, const Shape& r,
                            std::size_t frame) {
-  const std::vector<Tap> rows = taps(d.height, r.height), columns = taps(d.width, r.width);
-  std::vector<float> out(r.coefficients * 3 * r.height * r.width);
+  const std::size_t from = d.height * d.width, to = r.height * r.width;
+  std::vector<float> out(r.coefficients * 3 * to);
   for (std::size_t plane = 0; plane < 3 * d.coefficients; ++plane) {
-    const float* const tile =
-        &decoded.values[(frame * d.coefficients * 3 + plane) * d.height * d.width];
-    const auto at = [&](std::size_t i, std::size_t j) {
-      return static_cast<double>(tile[i * d.width + j]);
-    };
-    float* target = out.data() + plane * r.height * r.width;
-    for (const Tap& y : rows) {
-      for (const Tap& x : columns) {
-        const double low = (1 - x.t) * at(y.low, x.low) + x.t * at(y.low, x.high);
-        const double high = (1 - x.t) * at(y.high, x.low) + x.t * at(y.high, x.high);
-        *target++ = static_cast<float>((1 - y.t) * low + y.t * high);
-      }
-    }
+    relit::decoders::resize_map(
+        std::span(decoded.values).subspan((frame * d.coefficients * 3 + plane) * from, from),
+        {d.width, d.height}, std::span(out).subspan(plane * to, to), {r.width, r.height});
   }
   return out;
 }

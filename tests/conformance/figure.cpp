@@ -6,10 +6,10 @@
 #include <stdexcept>
 
 #include "bake_minimal/plane_encoder.hpp"
-#include "bake_minimal/png_encoder.hpp"
 #include "bake_minimal/pose_quantizer.hpp"
 #include "bake_minimal/stream_encoder.hpp"
 #include "bake_minimal/vertex_quantizer.hpp"
+#include "decoders/png_encoder.hpp"
 #include "decoders/texel_normals.hpp"
 
 namespace relit::conformance {
@@ -118,7 +118,7 @@ Encoded encode(const FigureOptions& o) {
 ImageRecord checkers() {
   const std::vector<std::uint8_t> rgba{255, 128, 64, 255, 32, 32, 200, 255,
                                        16,  200, 16, 255, 90, 90, 90,  255};
-  return {1, "image/png", must(bake::encode_png(2, 2, rgba))};
+  return {1, "image/png", must(decoders::encode_png(2, 2, rgba))};
 }
 
 VertexStream words(Semantic semantic, std::uint8_t stride, std::vector<std::uint16_t> values,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "bake_minimal/png_encoder.hpp"
+#include "decoders/png_encoder.hpp"
 
 extern "C" {
 #include <libavcodec/avcodec.h>
@@ -10,12 +10,12 @@ extern "C" {
 
 #include "decoders/ffmpeg.hpp"
 
-namespace relit::bake {
+namespace relit::decoders {
 namespace {
 
 Unexpected png_failure(const char* step, int code) {
   return fail(ErrorCode::kEnvironment,
-              std::string("PNG encoder: ") + step + " failed: " + decoders::ffmpeg::reason(code));
+              std::string("PNG encoder: ") + step + " failed: " + ffmpeg::reason(code));
 }
 
 bool opaque(std::span<const std::uint8_t> rgba) {
@@ -51,9 +51,9 @@ Result<std::vector<std::uint8_t>> encode_png(int width, int height,
   const AVCodec* codec = avcodec_find_encoder(AV_CODEC_ID_PNG);
   if (codec == nullptr) return fail(ErrorCode::kEnvironment, "libavcodec has no PNG encoder");
   const bool with_alpha = !opaque(rgba);
-  const decoders::ffmpeg::Codec context(avcodec_alloc_context3(codec));
-  const decoders::ffmpeg::Frame frame(av_frame_alloc());
-  const decoders::ffmpeg::Packet packet(av_packet_alloc());
+  const ffmpeg::Codec context(avcodec_alloc_context3(codec));
+  const ffmpeg::Frame frame(av_frame_alloc());
+  const ffmpeg::Packet packet(av_packet_alloc());
   if (!context || !frame || !packet) return fail(ErrorCode::kOutOfMemory, "PNG encoder: no memory");
   context->width = frame->width = width;
   context->height = frame->height = height;
@@ -78,4 +78,4 @@ Result<std::vector<std::uint8_t>> encode_png(int width, int height,
   return std::vector<std::uint8_t>(packet->data, packet->data + packet->size);
 }
 
-}  // namespace relit::bake
+}  // namespace relit::decoders
