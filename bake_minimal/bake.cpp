@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <map>
 #include <numeric>
 #include <utility>
 
@@ -21,6 +22,9 @@
 
 namespace relit::bake {
 namespace {
+
+/// Of blended poses: a pixel where a character is a thousand tall.
+constexpr double kMostPoseError = 1e-3;
 
 class Stopwatch {
  public:
@@ -57,13 +61,20 @@ class Bake {
   }
 
  private:
+  /// The frames that a file keeps, and their normals where there is a prediction.
+  struct Timeline {
+    KeptFrames kept;
+    std::unique_ptr<BakeNormals> normals;
+  };
+
   static Status check_output(const std::filesystem::path& path);
   void summarize();
   Status find_seams(BakePoser& poser, const TraceGeometry& geometry);
   Status trace();
   Result<BakeSummary> write(const BakeOutput& output);
   [[nodiscard]] std::vector<std::uint8_t> covered_texels() const;  // [H][W], 1: covered
-  Result<PlaneSplit> split_planes(const CodingOptions& coding);
+  Result<PlaneSplit> split_planes(const CodingOptions& coding, Timeline& frames);
+  Result<std::vector<CodingVariant>> with_steps(std::vector<CodingVariant> candidates);
   Result<CodingOptions> choose(const BakeOutput& output);
   Result<CodingTrial> try_coding(RangeScan scan);
   [[nodiscard]] ModelIds ids() const;
@@ -71,9 +82,13 @@ class Bake {
   Result<const RangeScan*> scan_for(const CodingOptions& options);
   Result<RangeScan> scan_range(const CodingOptions& options);
   Result<decoders::NpyWriter> write_reference();  // not committed
-  Result<TransferFrame> fill_frame(std::uint64_t frame);
-  Status write_static(container::Writer& writer, const PlaneEncoder& encoder);
-  Status write_segments(container::Writer& writer, PlaneEncoder& encoder);
+  Result<Timeline*> timeline(int step);
+  Result<TransferFrame> fill_frame(Timeline& frames, std::uint64_t frame);  // of those kept
+  Status score(Timeline& frames, const PlaneEncoder& encoder, decoders::PlaneDecoder& decoder,
+               decoders::RelitError& error);
+  Status write_static(container::Writer& writer, const KeptFrames& kept,
+                      const PlaneEncoder& encoder);
+  Status write_segments(container::Writer& writer, const KeptFrames& kept, PlaneEncoder& encoder);
   void fill_transfer(std::uint64_t frame);
 
   [[nodiscard]] std::size_t texels() const {
@@ -92,9 +107,9 @@ class Bake {
   std::vector<std::vector<std::uint8_t>> buried_;  // by frame; empty where nothing is
   std::optional<PushPull> push_pull_;              // for frames in which nothing is buried
   std::optional<SeamStitcher> stitcher_;
-  std::unique_ptr<BakeNormals> normals_;  // of models with a prediction
-  std::vector<float> filled_;             // [coefficients][3][H][W] of the frame in hand
-  std::vector<RangeScan> scans_;          // of each way to split and quantise that was asked for
+  std::map<int, Timeline> timelines_;  // by step
+  std::vector<float> filled_;          // [coefficients][3][H][W] of the frame in hand
+  std::vector<RangeScan> scans_;       // of each way to split and quantise that was asked for
   glm::vec3 bounds_min_{std::numeric_limits<float>::infinity()};
   glm::vec3 bounds_max_{-std::numeric_limits<float>::infinity()};
 };
@@ -113,7 +128,6 @@ void Bake::summarize() {
   summary_.order = options_.transfer.order;
   summary_.width = options_.transfer.width, summary_.height = options_.transfer.height;
   summary_.atlas = prepared_.atlas;
-  for (const auto& packet : prepared_.pose.packets) summary_.pose_bytes += packet.size();
   for (const decoders::Mesh& mesh : prepared_.packed.meshes) {
     summary_.vertices += mesh.positions.size();
     summary_.triangles += mesh.indices.size() / 3;
@@ -202,21 +216,29 @@ void Bake::fill_transfer(std::uint64_t frame) {
   });
 }
 
-Result<TransferFrame> Bake::fill_frame(std::uint64_t frame) {
-  fill_transfer(frame);
+Result<Bake::Timeline*> Bake::timeline(int step) {
+  const auto found = timelines_.find(step);
+  if (found != timelines_.end()) return &found->second;
+  RELIT_ASSIGN(KeptFrames kept, keep_frames(prepared_, step));
+  return &(timelines_[step] = Timeline{std::move(kept), nullptr});
+}
+
+Result<TransferFrame> Bake::fill_frame(Timeline& frames, std::uint64_t frame) {
+  fill_transfer(frame * static_cast<std::uint64_t>(frames.kept.step));
   TransferFrame filled{filled_};
-  if (normals_) {
-    RELIT_ASSIGN(filled.normals, normals_->at(frame));
+  if (frames.normals) {
+    RELIT_ASSIGN(filled.normals, frames.normals->at(frame));
   }
   return filled;
 }
 
-Status Bake::write_static(container::Writer& writer, const PlaneEncoder& encoder) {
+Status Bake::write_static(container::Writer& writer, const KeptFrames& kept,
+                          const PlaneEncoder& encoder) {
   container::ClipRecord clip;
-  clip.id = prepared_.pose.track.clip_id;
+  clip.id = kept.pose.track.clip_id;
   clip.name = summary_.clip;
-  clip.tick_rate = options_.frame_rate;
-  clip.frame_count = clip.duration_ticks = prepared_.frames;
+  clip.tick_rate = kept.rate;
+  clip.frame_count = clip.duration_ticks = kept.count;
   clip.loop = options_.loop && prepared_.frames > 1;
   for (int a = 0; a < 3; ++a) {
     clip.bounds_min[static_cast<std::size_t>(a)] = bounds_min_[a];
@@ -232,26 +254,26 @@ Status Bake::write_static(container::Writer& writer, const PlaneEncoder& encoder
   summary_.mesh_bytes = writer.bytes_written() - before_meshes;
   RELIT_TRY(writer.add(prepared_.packed.skeleton));
   const std::uint64_t before_track = writer.bytes_written();
-  RELIT_TRY(writer.add(prepared_.pose.track));
+  RELIT_TRY(writer.add(kept.pose.track));
   summary_.pose_bytes += writer.bytes_written() - before_track;
   RELIT_TRY(writer.add(encoder.model()));
   for (const auto& layer : encoder.layers()) RELIT_TRY(writer.add(layer));
   return {};
 }
 
-Status Bake::write_segments(container::Writer& writer, PlaneEncoder& encoder) {
+Status Bake::write_segments(container::Writer& writer, const KeptFrames& kept,
+                            PlaneEncoder& encoder) {
   while (std::optional<EncodedSegment> segment = encoder.take_segment()) {
     const std::uint64_t first = segment->segment.first_frame;
     for (const container::ChunkRecord& chunk : segment->chunks)
       summary_.video_bytes += chunk.data.size();
     container::ChunkRecord pose;
-    pose.track_id = prepared_.pose.track.track_id;
-    pose.data = prepared_.pose.packets[first / prepared_.segment_frames];
+    pose.track_id = kept.pose.track.track_id;
+    pose.data = kept.pose.packets[first / kept.segment_frames];
     pose.packets.push_back({static_cast<std::int64_t>(first), true, 0, pose.data.size()});
     segment->chunks.insert(segment->chunks.begin(), std::move(pose));
-    RELIT_TRY(
-        writer.write_segment({prepared_.pose.track.clip_id, first, segment->segment.frame_count},
-                             std::move(segment->chunks)));
+    RELIT_TRY(writer.write_segment({kept.pose.track.clip_id, first, segment->segment.frame_count},
+                                   std::move(segment->chunks)));
   }
   return {};
 }
@@ -264,23 +286,24 @@ std::vector<std::uint8_t> Bake::covered_texels() const {
 }
 
 // Principal planes take a pass of their own over the clip.
-Result<PlaneSplit> Bake::split_planes(const CodingOptions& coding) {
+Result<PlaneSplit> Bake::split_planes(const CodingOptions& coding, Timeline& frames) {
   const TransferShape shape{options_.transfer.order, options_.transfer.width,
                             options_.transfer.height};
   if (coding.planes == Planes::kColour) return PlaneSplit::colour(shape, coding);
   std::vector<std::uint8_t> known(texels(), 0);
   if (coding.predict) {
-    if (!normals_) {
-      RELIT_ASSIGN(normals_, BakeNormals::create(prepared_, shape.width, shape.height));
+    if (!frames.normals) {
+      RELIT_ASSIGN(frames.normals,
+                   BakeNormals::create(prepared_, frames.kept, shape.width, shape.height));
     }
-    known = normals_->mask();
+    known = frames.normals->mask();
   } else {
     for (const TexelSample& sample : prepared_.samples) known[sample.texel] = 1;
   }
   PrincipalAnalysis analysis(shape, coding.predict, covered_texels());
-  progress_.start("analyse", prepared_.frames, "frame");
-  for (std::uint64_t k = 0; k < prepared_.frames; ++k) {
-    RELIT_ASSIGN(const TransferFrame frame, fill_frame(k));
+  progress_.start("analyse", frames.kept.count, "frame");
+  for (std::uint64_t k = 0; k < frames.kept.count; ++k) {
+    RELIT_ASSIGN(const TransferFrame frame, fill_frame(frames, k));
     RELIT_TRY(analysis.add_frame(frame));
     progress_.advance(k + 1);
   }
@@ -297,18 +320,20 @@ ModelIds Bake::ids() const {
 
 Result<CodingOptions> Bake::resolved(const CodingOptions& options) const {
   CodingOptions coding = options;
-  coding.segment_frames = static_cast<int>(prepared_.segment_frames);
+  const auto step = static_cast<std::uint32_t>(std::max(options.frame_step, 1));
+  coding.segment_frames = static_cast<int>(std::max(prepared_.segment_frames / step, 1u));
   coding.threads = thread_count(options_.transfer.threads);
   return resolve(coding);
 }
 
 // Measures what the planes have to hold.
 Result<RangeScan> Bake::scan_range(const CodingOptions& coding) {
-  RELIT_ASSIGN(PlaneSplit split, split_planes(coding));
+  RELIT_ASSIGN(Timeline* const frames, timeline(coding.frame_step));
+  RELIT_ASSIGN(PlaneSplit split, split_planes(coding, *frames));
   RELIT_ASSIGN(RangeScan scan, RangeScan::create(std::move(split), coding));
-  progress_.start("measure", prepared_.frames, "frame");
-  for (std::uint64_t k = 0; k < prepared_.frames; ++k) {
-    RELIT_ASSIGN(const TransferFrame frame, fill_frame(k));
+  progress_.start("measure", frames->kept.count, "frame");
+  for (std::uint64_t k = 0; k < frames->kept.count; ++k) {
+    RELIT_ASSIGN(const TransferFrame frame, fill_frame(*frames, k));
     RELIT_TRY(scan.add_frame(frame));
     progress_.advance(k + 1);
   }
@@ -342,20 +367,43 @@ Result<decoders::NpyWriter> Bake::write_reference() {
   return reference;
 }
 
+// Leaving frames out is a candidate where blending moves the surface by less than what shows.
+Result<std::vector<CodingVariant>> Bake::with_steps(std::vector<CodingVariant> candidates) {
+  if (candidates.front().coding.frame_step != 0) return candidates;
+  std::vector<int> steps;
+  for (const int step : {2, 3, 4}) {
+    const auto every = static_cast<std::uint64_t>(step);
+    if (prepared_.frames % every != 0 || prepared_.frames / every < 3) continue;
+    RELIT_ASSIGN(const Timeline* const frames, timeline(step));
+    if (frames->kept.pose_error <= kMostPoseError) steps.push_back(step);
+  }
+  std::vector<CodingVariant> all;
+  for (CodingVariant& each : candidates) {
+    each.coding.frame_step = 1;
+    all.push_back(each);
+    for (const int step : steps) {
+      all.push_back(each);
+      all.back().coding.frame_step = step;
+      all.back().name += " 1/" + std::to_string(step);
+    }
+  }
+  return all;
+}
+
 // Searches the candidates for what the goal asks.
 Result<CodingOptions> Bake::choose(const BakeOutput& output) {
   if (!options_.goal) return resolved(output.candidates.front().coding);
+  RELIT_ASSIGN(const std::vector<CodingVariant> candidates, with_steps(output.candidates));
   const double clip_s = prepared_.time_s(prepared_.frames);
-  RELIT_ASSIGN(summary_.choice,
-               choose_coding(*options_.goal, output.candidates, clip_s,
-                             [&](std::size_t candidate, double crf) -> Result<CodingTrial> {
-                               CodingOptions coding = output.candidates[candidate].coding;
-                               coding.crf = crf;
-                               RELIT_ASSIGN(coding, resolved(coding));
-                               RELIT_ASSIGN(const RangeScan* const scan, scan_for(coding));
-                               return try_coding(*scan);
-                             }));
-  CodingOptions coding = output.candidates[summary_.choice->candidate].coding;
+  const auto attempt = [&](std::size_t candidate, double crf) -> Result<CodingTrial> {
+    CodingOptions coding = candidates[candidate].coding;
+    coding.crf = crf;
+    RELIT_ASSIGN(coding, resolved(coding));
+    RELIT_ASSIGN(const RangeScan* const scan, scan_for(coding));
+    return try_coding(*scan);
+  };
+  RELIT_ASSIGN(summary_.choice, choose_coding(*options_.goal, candidates, clip_s, attempt));
+  CodingOptions coding = candidates[summary_.choice->candidate].coding;
   coding.crf = summary_.choice->trial.crf;
   return resolved(coding);
 }
@@ -363,7 +411,8 @@ Result<CodingOptions> Bake::choose(const BakeOutput& output) {
 // Codes and decodes the whole clip.
 Result<CodingTrial> Bake::try_coding(RangeScan scan) {
   CodingTrial trial{*scan.options().crf, 0, {}};
-  for (const auto& packet : prepared_.pose.packets) trial.bytes += packet.size();
+  RELIT_ASSIGN(Timeline* const frames, timeline(scan.options().frame_step));
+  for (const auto& packet : frames->kept.pose.packets) trial.bytes += packet.size();
   RELIT_ASSIGN(PlaneEncoder encoder, PlaneEncoder::begin(std::move(scan), ids()));
   RELIT_ASSIGN(auto decoder, decoders::PlaneDecoder::open(encoder.model(), encoder.layers()));
   const auto take = [&]() -> Status {
@@ -375,53 +424,83 @@ Result<CodingTrial> Bake::try_coding(RangeScan scan) {
     }
     return {};
   };
-  decoders::RelitError error(decoders::standard_lights(),
-                             decoders::coefficient_count(options_.transfer.order),
-                             covered_texels());
-  progress_.start("try", 2 * prepared_.frames, "frame");
-  for (std::uint64_t k = 0; k < prepared_.frames; ++k) {
-    RELIT_ASSIGN(const TransferFrame frame, fill_frame(k));
+  progress_.start("try", frames->kept.count + prepared_.frames, "frame");
+  for (std::uint64_t k = 0; k < frames->kept.count; ++k) {
+    RELIT_ASSIGN(const TransferFrame frame, fill_frame(*frames, k));
     RELIT_TRY(encoder.encode_frame(frame));
     RELIT_TRY(take());
     progress_.advance(k + 1);
   }
   RELIT_TRY(encoder.finish());
   RELIT_TRY(take());
-  std::vector<float> decoded(planes() * texels());
-  decoders::FrameView view;
-  for (std::uint64_t k = 0; k < prepared_.frames; ++k) {
-    RELIT_ASSIGN(const TransferFrame frame, fill_frame(k));
-    RELIT_TRY(decoder.frame(k, view));
-    RELIT_TRY(decoders::reconstruct(view.planes(), encoder.model(), encoder.layers(), decoded,
-                                    frame.normals));
-    error.add_frame(frame.transfer, decoded);
-    progress_.advance(prepared_.frames + k + 1);
-  }
+  decoders::RelitError error(decoders::standard_lights(),
+                             decoders::coefficient_count(options_.transfer.order),
+                             covered_texels());
+  RELIT_TRY(score(*frames, encoder, decoder, error));
   progress_.finish();
   trial.figures = error.figures();
   return trial;
+}
+
+// Every frame that was traced against what a player shows then: those that were left out are
+// blended, at the end into the first where the clip loops.
+Status Bake::score(Timeline& frames, const PlaneEncoder& encoder, decoders::PlaneDecoder& decoder,
+                   decoders::RelitError& error) {
+  std::vector<float> first, before, now(planes() * texels()), blended(now.size());
+  decoders::FrameView view;
+  const int step = frames.kept.step;
+  const auto compare = [&](std::uint64_t frame, std::span<const float> decoded) {
+    fill_transfer(frame);
+    error.add_frame(filled_, decoded);
+    progress_.advance(frames.kept.count + frame + 1);
+  };
+  const auto compare_between = [&](std::uint64_t kept, std::span<const float> next) {
+    for (int i = 1; i < step; ++i) {
+      const float t = static_cast<float>(i) / static_cast<float>(step);
+      for (std::size_t v = 0; v < blended.size(); ++v)
+        blended[v] = std::lerp(before[v], next[v], t);
+      compare(kept * static_cast<std::uint64_t>(step) + static_cast<std::uint64_t>(i), blended);
+    }
+  };
+  for (std::uint64_t k = 0; k < frames.kept.count; ++k) {
+    RELIT_ASSIGN(const TransferFrame frame, fill_frame(frames, k));
+    RELIT_TRY(decoder.frame(k, view));
+    RELIT_TRY(decoders::reconstruct(view.planes(), encoder.model(), encoder.layers(), now,
+                                    frame.normals));
+    if (k > 0) compare_between(k - 1, now);
+    compare(k * static_cast<std::uint64_t>(step), now);
+    if (step == 1) continue;
+    if (k == 0) first = now;
+    before = now;
+  }
+  if (step > 1) compare_between(frames.kept.count - 1, options_.loop ? first : before);
+  return {};
 }
 
 Result<BakeSummary> Bake::write(const BakeOutput& output) {
   const Stopwatch watch;
   const BakeSummary before = summary_;
   RELIT_ASSIGN(summary_.coding, choose(output));
+  RELIT_ASSIGN(Timeline* const frames, timeline(summary_.coding.frame_step));
+  const KeptFrames& kept = frames->kept;
+  summary_.frames = kept.count, summary_.frame_rate = kept.rate;
+  for (const auto& packet : kept.pose.packets) summary_.pose_bytes += packet.size();
   RELIT_ASSIGN(const RangeScan* const scan, scan_for(summary_.coding));
   RELIT_ASSIGN(PlaneEncoder encoder, PlaneEncoder::begin(*scan, ids()));
   summary_.decoder_bytes = encoder.decoder_bytes();
   RELIT_ASSIGN(auto sink, container::FileSink::create(output.path.string()));
   RELIT_ASSIGN(container::Writer writer,
                container::Writer::create(*sink, "relit-bake " RELIT_VERSION));
-  RELIT_TRY(write_static(writer, encoder));
-  progress_.start("code", prepared_.frames, "frame");
-  for (std::uint64_t k = 0; k < prepared_.frames; ++k) {
-    RELIT_ASSIGN(const TransferFrame frame, fill_frame(k));
+  RELIT_TRY(write_static(writer, kept, encoder));
+  progress_.start("code", kept.count, "frame");
+  for (std::uint64_t k = 0; k < kept.count; ++k) {
+    RELIT_ASSIGN(const TransferFrame frame, fill_frame(*frames, k));
     RELIT_TRY(encoder.encode_frame(frame));
-    RELIT_TRY(write_segments(writer, encoder));
+    RELIT_TRY(write_segments(writer, kept, encoder));
     progress_.advance(k + 1);
   }
   RELIT_TRY(encoder.finish());
-  RELIT_TRY(write_segments(writer, encoder));
+  RELIT_TRY(write_segments(writer, kept, encoder));
   RELIT_TRY(writer.finish());
   progress_.finish();
   RELIT_TRY(sink->commit());

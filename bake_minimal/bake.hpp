@@ -63,7 +63,8 @@ struct BakeOutput {
 struct BakeSummary {
   std::filesystem::path output;
   std::string clip;
-  std::uint64_t frames = 0;
+  std::uint64_t frames = 0;  ///< that the file holds
+  container::Rational frame_rate;
   int order = 0, width = 0, height = 0;
   std::size_t vertices = 0, triangles = 0, samples = 0, covered = 0;
   AtlasReport atlas;
@@ -130,13 +131,30 @@ class BakePoser {
   std::vector<glm::vec3> positions_, normals_, primitive_positions_, primitive_normals_;
 };
 
+/// The frames that a file holds of those that were traced: every `step`th.
+struct KeptFrames {
+  int step = 1;
+  std::uint64_t count = 1;
+  std::uint32_t segment_frames = 25;
+  container::Rational rate;  ///< frames a second
+  PoseEncoding pose;
+  /// Root mean square of how far vertices of blended poses lie from where the frames that are left
+  /// out have them, over the longest side of the box around the clip.
+  double pose_error = 0;
+};
+
+/// Errors: kInvalid where `step` does not divide the frames of a clip, since its end would move;
+/// those of encode_pose().
+[[nodiscard]] Result<KeptFrames> keep_frames(const PreparedBake& prepared, int step);
+
 /// The normals of the light map's texels, frame by frame, as the player will have them.
 class BakeNormals {
  public:
   /// Errors: those of decoders::PoseTrack and decoders::TexelNormals.
-  static Result<std::unique_ptr<BakeNormals>> create(const PreparedBake& prepared, int width,
-                                                     int height);
-  /// [H][W]; valid until the next call. Errors: those of decoders::PoseTrack.
+  static Result<std::unique_ptr<BakeNormals>> create(const PreparedBake& prepared,
+                                                     const KeptFrames& kept, int width, int height);
+  /// [H][W], of one of the frames that are kept; valid until the next call. Errors: those of
+  /// decoders::PoseTrack.
   Result<std::span<const glm::vec3>> at(std::uint64_t frame);
   /// [H][W], 1 where a texel has a normal.
   [[nodiscard]] std::vector<std::uint8_t> mask() const;

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
+#include <cmath>
+#include <numeric>
 
 #include "bake_minimal/bake.hpp"
 
@@ -47,24 +49,61 @@ TraceGeometry trace_geometry(const PackedScene& packed) {
 
 namespace {
 
-Result<decoders::PoseTrack> pose_track(const PreparedBake& prepared,
+Result<decoders::PoseTrack> pose_track(const PackedScene& packed, const PoseEncoding& pose,
+                                       std::uint64_t frames, std::uint32_t segment_frames,
                                        std::span<const decoders::Mesh> meshes) {
   RELIT_ASSIGN(decoders::PoseTrack track,
-               decoders::PoseTrack::create(prepared.packed.skeleton, prepared.pose.track, meshes));
-  for (std::size_t s = 0; s < prepared.pose.packets.size(); ++s) {
-    const std::uint64_t first = s * std::uint64_t{prepared.segment_frames};
-    const std::uint64_t count =
-        std::min<std::uint64_t>(prepared.segment_frames, prepared.frames - first);
-    RELIT_TRY(track.add_packet(prepared.pose.packets[s], first, static_cast<std::uint32_t>(count)));
+               decoders::PoseTrack::create(packed.skeleton, pose.track, meshes));
+  for (std::size_t s = 0; s < pose.packets.size(); ++s) {
+    const std::uint64_t first = s * std::uint64_t{segment_frames};
+    const std::uint64_t count = std::min<std::uint64_t>(segment_frames, frames - first);
+    RELIT_TRY(track.add_packet(pose.packets[s], first, static_cast<std::uint32_t>(count)));
   }
   return track;
+}
+
+Result<decoders::PoseTrack> pose_track(const PreparedBake& prepared) {
+  return pose_track(prepared.packed, prepared.pose, prepared.frames, prepared.segment_frames,
+                    prepared.packed.meshes);
+}
+
+// Compares what a player makes of the frames that are kept with the frames that are not.
+Result<double> blended_pose_error(const PreparedBake& prepared, const KeptFrames& kept) {
+  const std::vector<decoders::Mesh>& meshes = prepared.packed.meshes;
+  RELIT_ASSIGN(const decoders::PoseTrack track, pose_track(prepared));
+  RELIT_ASSIGN(const decoders::PoseTrack coarse,
+               pose_track(prepared.packed, kept.pose, kept.count, kept.segment_frames, meshes));
+  decoders::Pose pose;
+  std::vector<glm::vec3> truth, blended;
+  glm::vec3 low(std::numeric_limits<float>::infinity()), high(-low);
+  double squares = 0, points = 0;
+  const std::uint64_t last = (kept.count - 1) * static_cast<std::uint64_t>(kept.step);
+  for (std::uint64_t k = 0; k <= last; ++k) {
+    for (std::size_t m = 0; m < meshes.size(); ++m) {
+      truth.resize(meshes[m].positions.size()), blended.resize(truth.size());
+      RELIT_TRY(track.sample(static_cast<double>(k), pose));
+      decoders::pose_mesh(meshes[m], m, pose, truth, {});
+      RELIT_TRY(coarse.sample(static_cast<double>(k) / kept.step, pose));
+      decoders::pose_mesh(meshes[m], m, pose, blended, {});
+      for (std::size_t v = 0; v < truth.size(); ++v) {
+        low = glm::min(low, truth[v]), high = glm::max(high, truth[v]);
+        if (k % static_cast<std::uint64_t>(kept.step) == 0) continue;
+        const glm::dvec3 off = glm::dvec3(blended[v]) - glm::dvec3(truth[v]);
+        squares += glm::dot(off, off), points += 1;
+      }
+    }
+  }
+  const glm::vec3 size = high - low;
+  const double longest = std::max({static_cast<double>(size.x), static_cast<double>(size.y),
+                                   static_cast<double>(size.z), 1e-30});
+  return points > 0 ? std::sqrt(squares / points) / longest : 0;
 }
 
 }  // namespace
 
 Result<BakePoser> BakePoser::create(const PreparedBake& prepared) {
   const PackedScene& packed = prepared.packed;
-  RELIT_ASSIGN(decoders::PoseTrack track, pose_track(prepared, packed.meshes));
+  RELIT_ASSIGN(decoders::PoseTrack track, pose_track(prepared));
   BakePoser poser(prepared, std::move(track));
   std::size_t vertices = 0;
   for (const decoders::Mesh& mesh : packed.meshes) vertices += mesh.positions.size();
@@ -101,7 +140,42 @@ Status BakePoser::pose(std::uint64_t frame) {
   return {};
 }
 
-Result<std::unique_ptr<BakeNormals>> BakeNormals::create(const PreparedBake& prepared, int width,
+Result<KeptFrames> keep_frames(const PreparedBake& prepared, int step) {
+  KeptFrames kept;
+  kept.step = step;
+  kept.rate = prepared.frame_rate, kept.count = prepared.frames;
+  kept.segment_frames = prepared.segment_frames;
+  if (step == 1) {
+    kept.pose = prepared.pose;
+    return kept;
+  }
+  const auto every = static_cast<std::uint64_t>(std::max(step, 1));
+  if (step < 1 || prepared.frames % every != 0) {
+    return fail(ErrorCode::kInvalid, "--frame-step " + std::to_string(step) +
+                                         ": it must divide the clip's " +
+                                         std::to_string(prepared.frames) + " frames");
+  }
+  kept.count = prepared.frames / every;
+  const std::int64_t common = std::gcd(prepared.frame_rate.num, std::int64_t{step});
+  kept.rate = {prepared.frame_rate.num / common, prepared.frame_rate.den * (step / common)};
+  kept.segment_frames = std::max(prepared.segment_frames / static_cast<std::uint32_t>(step), 1u);
+  std::vector<double> times(kept.count);
+  for (std::uint64_t j = 0; j < kept.count; ++j) times[j] = prepared.time_s(j * every);
+  PoseOptions options;
+  // The meshes are packed for this kind.
+  options.choice = prepared.pose.track.kind == container::PoseKind::kVertices
+                       ? PoseChoice::kVertices
+                       : PoseChoice::kJoints;
+  options.clip = prepared.clip;
+  options.track_id = prepared.pose.track.track_id, options.clip_id = prepared.pose.track.clip_id;
+  options.segment_frames = kept.segment_frames;
+  RELIT_ASSIGN(kept.pose, encode_pose(prepared.scene, times, prepared.packed, options));
+  RELIT_ASSIGN(kept.pose_error, blended_pose_error(prepared, kept));
+  return kept;
+}
+
+Result<std::unique_ptr<BakeNormals>> BakeNormals::create(const PreparedBake& prepared,
+                                                         const KeptFrames& kept, int width,
                                                          int height) {
   const container::SkeletonRecord& skeleton = prepared.packed.skeleton;
   std::vector<decoders::Mesh> meshes;
@@ -110,7 +184,8 @@ Result<std::unique_ptr<BakeNormals>> BakeNormals::create(const PreparedBake& pre
                                                             skeleton.morph_weight_count));
     meshes.push_back(std::move(mesh));
   }
-  RELIT_ASSIGN(decoders::PoseTrack track, pose_track(prepared, meshes));
+  RELIT_ASSIGN(decoders::PoseTrack track,
+               pose_track(prepared.packed, kept.pose, kept.count, kept.segment_frames, meshes));
   const auto texels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   std::unique_ptr<BakeNormals> normals(
       new BakeNormals(std::move(meshes), std::move(track), texels));

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "bake_minimal/bake.hpp"
+#include "bake_minimal/vertex_quantizer.hpp"
 
 namespace relit::bake {
 namespace {
@@ -80,6 +81,8 @@ Status unwrap(const BakeOptions& options, PreparedBake& out) {
 Status pack(const BakeOptions& options, PreparedBake& out) {
   PackOptions pack_options;
   pack_options.clip = out.clip;
+  pack_options.lightmap_uv_bits =
+      uv_bits(kLightMapSteps * std::max(options.transfer.width, options.transfer.height));
   // What is predicted from normals is predicted from those in the file. A twentieth of a mesh, they
   // save a fifth of the planes over what the triangles alone tell.
   pack_options.normals = options.write_normals;

@@ -117,7 +117,7 @@ CodingOptions paper_options() {
 bool same_planes(const CodingOptions& a, const CodingOptions& b) {
   const auto planes = [](const CodingOptions& o) {
     return std::tuple(o.lossless, *o.bit_depth, o.planes, o.principal_count, o.predict, *o.chroma,
-                      o.exponent_block, o.exponent_hold, o.layout, o.segment_frames,
+                      o.exponent_block, o.exponent_hold, o.frame_step, o.layout, o.segment_frames,
                       o.uniform_steps, o.centred);
   };
   return planes(a) == planes(b);
@@ -144,6 +144,10 @@ Result<CodingOptions> resolve(CodingOptions o) {
                    " is not known; h264, hevc, mpeg4, ffv1, vp9 and av1 are");
   }
   if (!codec->lossy) o.lossless = true;
+  if (o.frame_step < 0 || o.frame_step > 64) {
+    return invalid("--frame-step is 1 to 64, not " + std::to_string(o.frame_step));
+  }
+  o.frame_step = std::max(o.frame_step, 1);
   if (o.lossless && !codec->lossless) {
     return invalid("--codec " + o.codec + " cannot be lossless; h264, hevc, vp9 and ffv1 can");
   }

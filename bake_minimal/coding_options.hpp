@@ -63,6 +63,10 @@ struct CodingOptions {
   /// segment.
   int exponent_hold = 0;
 
+  /// Every so many frames are kept of those that were traced, and players blend in between (Xu et
+  /// al., key frames). 0: all, or with a goal what it takes.
+  int frame_step = 0;
+
   Layout layout = Layout::kLayered;
   int segment_frames = 25;  ///< frames a segment, each a closed group of pictures
 

@@ -56,7 +56,7 @@ class ScenePacker {
   Status check_scene() const {
     const auto bits = [](int value, int low) { return value >= low && value <= 16; };
     if (!bits(options_.position_bits, 8) || !bits(options_.lightmap_uv_bits, 10) ||
-        !bits(options_.albedo_uv_bits, 10)) {
+        (options_.albedo_uv_bits != 0 && !bits(options_.albedo_uv_bits, 10))) {
       return fail(ErrorCode::kInvalid,
                   "packing: positions take 8 to 16 bits, texture coordinates 10 to 16");
     }
@@ -244,7 +244,7 @@ class ScenePacker {
         }
       }
     }
-    PrimitiveGrids grids{uniform_grid(low, high, options_.position_bits), {}};
+    PrimitiveGrids grids{uniform_grid(low, high, options_.position_bits), {}, 0};
     for (const float r : reach) {
       grids.morph_steps.push_back(std::max(r / 32767.0f, grids.positions.step[0]));
     }
@@ -264,8 +264,13 @@ class ScenePacker {
                                            std::to_string(texture->texcoord) +
                                            ", which it does not have");
     }
+    PrimitiveGrids grids = grids_of(prepared);
+    if (texture != nullptr) {
+      const Image& picture = out_.materials.texels[static_cast<std::size_t>(texture->image)];
+      grids.albedo_texels = std::max(picture.width, picture.height);
+    }
     RELIT_ASSIGN(std::vector<PackedPart> parts,
-                 pack_primitive(scene_, prepared, grids_of(prepared), texture, options_));
+                 pack_primitive(scene_, prepared, grids, texture, options_));
     if (parts.empty()) {
       out_.warnings.push_back("primitive " + std::to_string(prepared.primitive) + " (\"" + p.name +
                               "\") has no triangle with three different vertices; left out");

@@ -9,6 +9,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "bake_minimal/influence_slots.hpp"
 #include "bake_minimal/stream_encoder.hpp"
 #include "bake_minimal/triangle_order.hpp"
 #include "container/base/limits.hpp"
@@ -118,14 +119,29 @@ class Quantizer {
   }
 
   void add_lightmap_uv() {
-    const Grid grid = uniform_grid(glm::vec3(0), glm::vec3(1), options_.lightmap_uv_bits);
+    int bits = options_.lightmap_uv_bits;
+    if (texture_ != nullptr && albedo_uv() == primitive_.lightmap_uv) {
+      bits = std::max(bits, albedo_bits(1));
+    }
+    const Grid grid = uniform_grid(glm::vec3(0), glm::vec3(1), bits);
     streams.push_back(uv_stream(Semantic::kLightMapUv, grid, primitive_.lightmap_uv));
   }
 
-  void add_albedo_uv() {
+  std::vector<glm::vec2> albedo_uv() const {
     const auto set = static_cast<std::size_t>(texture_->texcoord);
     std::vector<glm::vec2> uv = primitive_.texcoords[set];
     for (glm::vec2& v : uv) v = glm::vec2(texture_->uv_transform * glm::vec3(v, 1.0f));
+    return uv;
+  }
+
+  /// For texture coordinates that span `range` pictures.
+  int albedo_bits(double range) const {
+    if (options_.albedo_uv_bits != 0) return options_.albedo_uv_bits;
+    return uv_bits(range * grids_.albedo_texels * kAlbedoSteps);
+  }
+
+  void add_albedo_uv() {
+    const std::vector<glm::vec2> uv = albedo_uv();
     if (uv == primitive_.lightmap_uv) return;
     glm::vec3 low(0), high(0);
     if (!uv.empty()) low = high = glm::vec3(uv[0], 0.0f);
@@ -133,7 +149,9 @@ class Quantizer {
       low = glm::min(low, glm::vec3(v, 0.0f));
       high = glm::max(high, glm::vec3(v, 0.0f));
     }
-    const Grid grid = uniform_grid(low, high, options_.albedo_uv_bits);
+    const double range =
+        std::max(static_cast<double>(high.x) - low.x, static_cast<double>(high.y) - low.y);
+    const Grid grid = uniform_grid(low, high, albedo_bits(range));
     streams.push_back(uv_stream(Semantic::kAlbedoUv, grid, uv));
   }
 
@@ -266,21 +284,64 @@ std::vector<glm::vec3> gather(const std::vector<glm::vec3>& values,
   return out;
 }
 
+/// For each vertex the earlier one that equals it in every stream but the UVs, or kNoTwin; empty
+/// where that is so for none.
+std::vector<std::uint16_t> find_twins(std::span<const VertexStream> streams,
+                                      std::span<const MorphTarget> targets, std::size_t count) {
+  std::vector<std::string> keys(count);
+  std::unordered_map<std::string_view, std::uint16_t> first;
+  std::vector<std::uint16_t> twins(count, decoders::kNoTwin);
+  const auto append = [&](const std::vector<std::uint8_t>& bytes, std::size_t stride) {
+    for (std::size_t v = 0; v < count; ++v) {
+      keys[v].append(reinterpret_cast<const char*>(&bytes[v * stride]), stride);
+    }
+  };
+  for (const VertexStream& s : streams) {
+    if (decoders::form_of(s.semantic).of_points) append(s.bytes, s.stride);
+  }
+  for (const MorphTarget& t : targets) append(t.bytes, decoders::morph_target_form().stride);
+  std::uint16_t last = 0;
+  bool any = false;
+  for (std::size_t v = 0; v < count; ++v) {
+    const auto [found, is_new] = first.try_emplace(keys[v], static_cast<std::uint16_t>(v));
+    // A distance of exactly 2^15 has no word of its own.
+    if (is_new || static_cast<std::uint16_t>(found->second - last) == 0x8000) continue;
+    twins[v] = last = found->second;
+    any = true;
+  }
+  if (!any) twins.clear();
+  return twins;
+}
+
 container::MeshRecord make_record(const Quantizer& q, const MeshPart& part,
                                   std::uint32_t first_morph_weight) {
+  const std::size_t count = part.vertices.size();
   container::MeshRecord record;
-  record.vertex_count = static_cast<std::uint32_t>(part.vertices.size());
+  record.vertex_count = static_cast<std::uint32_t>(count);
   record.index_count = static_cast<std::uint32_t>(part.indices.size());
   record.first_morph_weight = q.targets.empty() ? 0 : first_morph_weight;
   for (const VertexStream& s : q.streams) {
-    VertexStream& stream = record.streams.emplace_back(s);
-    stream.bytes = encode_vertex_stream(gather(s.bytes, s.stride, part.vertices), s.stride);
+    record.streams.emplace_back(s).bytes = gather(s.bytes, s.stride, part.vertices);
   }
   for (const MorphTarget& t : q.targets) {
-    record.morph_targets.push_back(
-        {t.scale, encode_vertex_stream(gather(t.bytes, 8, part.vertices), 8)});
+    record.morph_targets.push_back({t.scale, gather(t.bytes, 8, part.vertices)});
   }
-  record.indices = encode_index_stream(part.indices, part.vertices.size());
+  record.indices = encode_index_stream(part.indices, count);
+  const std::vector<std::uint16_t> indices(part.indices.begin(), part.indices.end());
+  const decoders::VertexLinks links = decoders::link_vertices(
+      indices, count, find_twins(record.streams, record.morph_targets, count));
+  match_influence_slots(record.streams, links);
+  for (VertexStream& s : record.streams) {
+    s.bytes = encode_vertex_stream(s.bytes, decoders::form_of(s.semantic), links);
+  }
+  for (MorphTarget& t : record.morph_targets) {
+    t.bytes = encode_vertex_stream(t.bytes, decoders::morph_target_form(), links);
+  }
+  if (!links.twins.empty()) {
+    VertexStream twins = make_stream(Semantic::kTwin, 2);
+    twins.bytes = encode_twins(links.twins);
+    record.streams.push_back(std::move(twins));
+  }
   return record;
 }
 

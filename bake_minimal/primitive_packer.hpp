@@ -31,6 +31,7 @@ struct PreparedPrimitive {
 struct PrimitiveGrids {
   Grid positions;
   std::vector<float> morph_steps;  ///< by morph target
+  int albedo_texels = 0;           ///< the longer side of the material's picture
 };
 
 /// Sizes, indices, joints and finite numbers of a primitive. Errors: kInvalid, kLimit.

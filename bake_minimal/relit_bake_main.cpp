@@ -182,6 +182,11 @@ void add_options(CLI::App& app, Arguments& a) {
   app.add_option("--segment", a.bake.segment_s, "seconds that can be decoded by themselves")
       ->capture_default_str()
       ->group("Coding");
+  app.add_option("--frame-step", a.bake.coding.frame_step,
+                 "keep every so many frames of those traced, and have players blend in between; 0: "
+                 "all, or what a target takes")
+      ->capture_default_str()
+      ->group("Coding");
   app.add_option("--layout", a.layout, "layered or grid")
       ->check(CLI::IsMember({"layered", "grid"}))
       ->capture_default_str()
@@ -324,12 +329,12 @@ nlohmann::ordered_json trial_json(const CodingTrial& trial) {
           {"error_p99", trial.figures.p99}};
 }
 
-nlohmann::ordered_json summary_json(const BakeSummary& s, const BakeOptions& options) {
+nlohmann::ordered_json summary_json(const BakeSummary& s) {
   nlohmann::ordered_json json;
   json["output"] = s.output.string();
   json["clip"] = s.clip;
   json["frames"] = s.frames;
-  json["fps"] = {options.frame_rate.num, options.frame_rate.den};
+  json["fps"] = {s.frame_rate.num, s.frame_rate.den};
   json["order"] = s.order;
   json["size"] = {s.width, s.height};
   json["vertices"] = s.vertices;
@@ -371,7 +376,7 @@ nlohmann::ordered_json summary_json(const BakeSummary& s, const BakeOptions& opt
 /// An object, or for a sweep a list of them.
 void print_json(const std::vector<BakeSummary>& summaries, const BakeOptions& options) {
   nlohmann::ordered_json json = nlohmann::ordered_json::array();
-  for (const BakeSummary& summary : summaries) json.push_back(summary_json(summary, options));
+  for (const BakeSummary& summary : summaries) json.push_back(summary_json(summary));
   if (options.sweep.empty()) json = nlohmann::ordered_json(json.front());
   std::printf("%s\n", json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
 }

@@ -41,7 +41,7 @@ bool parse_optional(const std::string& text, std::optional<T>& out) {
   return parse(text, out.emplace());
 }
 
-const std::array<Knob, 11> kKnobs{{
+const std::array<Knob, 12> kKnobs{{
     {"codec", "", [](CodingOptions& o, const std::string& v) { return !(o.codec = v).empty(); }},
     {"crf", "crf", [](CodingOptions& o, const std::string& v) { return parse_optional(v, o.crf); }},
     {"planes", "",
@@ -67,6 +67,8 @@ const std::array<Knob, 11> kKnobs{{
      [](CodingOptions& o, const std::string& v) { return parse(v, o.exponent_block); }},
     {"exponent-hold", "hold",
      [](CodingOptions& o, const std::string& v) { return parse(v, o.exponent_hold); }},
+    {"frame-step", "step",
+     [](CodingOptions& o, const std::string& v) { return parse(v, o.frame_step); }},
     {"layout", "",
      [](CodingOptions& o, const std::string& v) {
        return choose<Layout>(v, {{"layered", Layout::kLayered}, {"grid", Layout::kGrid}}, o.layout);

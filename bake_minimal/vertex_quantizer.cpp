@@ -21,6 +21,12 @@ Grid uniform_grid(const glm::vec3& low, const glm::vec3& high, int bits) {
   return {{low.x, low.y, low.z}, {step, step, step}};
 }
 
+int uv_bits(double steps) {
+  int bits = 10;
+  while (bits < 16 && (1 << bits) < steps) ++bits;
+  return bits;
+}
+
 std::vector<Influence> quantize_weights(std::span<const Influence> influences) {
   struct Share {
     std::uint16_t joint;

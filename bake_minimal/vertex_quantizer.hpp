@@ -21,6 +21,14 @@ struct Grid {
 /// of them. A box without extent gets a step of 1. `bits`: 1..16.
 [[nodiscard]] Grid uniform_grid(const glm::vec3& low, const glm::vec3& high, int bits);
 
+/// Steps of texture coordinates a texel: half a step, which a corner may be off by, is 1/32 texel
+/// of a light map and 1/8 texel of a picture.
+inline constexpr double kLightMapSteps = 16;
+inline constexpr double kAlbedoSteps = 4;
+
+/// The fewest bits, 10 to 16, that hold so many steps.
+[[nodiscard]] int uv_bits(double steps);
+
 /// A palette index and how much it counts.
 struct Influence {
   std::uint16_t joint = 0;

@@ -35,6 +35,8 @@ std::uint8_t stride_of(Semantic semantic) {
     case Semantic::kColor:
     case Semantic::kWeights:
       return 4;
+    case Semantic::kTwin:
+      return 2;
   }
   return 0;
 }
@@ -82,7 +84,7 @@ Result<MeshRecord> parse_mesh(std::span<const std::uint8_t> payload) {
   record.index_count = r.u32("index_count");
   record.streams.resize(r.count("streams", limits::kVertexStreams, kStreamLeastBytes));
   for (VertexStream& s : record.streams) {
-    s.semantic = r.enumeration("stream.semantic", Semantic::kWeights);
+    s.semantic = r.enumeration("stream.semantic", Semantic::kTwin);
     s.stride = r.u8("stream.stride");
     s.offset = r.f32s<3>("stream.offset");
     s.scale = r.f32s<3>("stream.scale");
@@ -104,9 +106,9 @@ namespace {
 
 Status validate_streams(const std::vector<VertexStream>& streams) {
   RELIT_TRY(at_most(streams.size(), limits::kVertexStreams, "number of vertex streams"));
-  std::array<int, 7> count{};
+  std::array<int, 8> count{};
   for (const VertexStream& s : streams) {
-    RELIT_TRY(known(s.semantic, Semantic::kWeights, "stream.semantic"));
+    RELIT_TRY(known(s.semantic, Semantic::kTwin, "stream.semantic"));
     ++count[static_cast<std::size_t>(s.semantic)];
     RELIT_REQUIRE(s.stride == stride_of(s.semantic),
                   "stream.stride " + std::to_string(s.stride) + " should be " +
@@ -119,9 +121,9 @@ Status validate_streams(const std::vector<VertexStream>& streams) {
   const auto of = [&](Semantic s) { return count[static_cast<std::size_t>(s)]; };
   RELIT_REQUIRE(of(Semantic::kPosition) == 1, "a mesh needs exactly one position stream");
   RELIT_REQUIRE(of(Semantic::kLightMapUv) == 1, "a mesh needs exactly one light-map UV stream");
-  RELIT_REQUIRE(
-      of(Semantic::kNormal) <= 1 && of(Semantic::kAlbedoUv) <= 1 && of(Semantic::kColor) <= 1,
-      "normals, albedo UVs and colours have at most one stream each");
+  RELIT_REQUIRE(of(Semantic::kNormal) <= 1 && of(Semantic::kAlbedoUv) <= 1 &&
+                    of(Semantic::kColor) <= 1 && of(Semantic::kTwin) <= 1,
+                "normals, albedo UVs, colours and twins have at most one stream each");
   RELIT_REQUIRE(of(Semantic::kJoints) <= 2 && of(Semantic::kJoints) == of(Semantic::kWeights),
                 "joints and weights need as many streams, at most two of each");
   return {};

@@ -83,13 +83,14 @@ enum class Semantic : std::uint8_t {
   kColor = 4,       ///< u8×4, linear, straight alpha; optional
   kJoints = 5,      ///< u16×4 palette indices; a second stream of the same semantic holds 4..7
   kWeights = 6,     ///< u8×4, all streams of a vertex sum to 255
+  kTwin = 7,        ///< u16: the vertex before that all but UVs are shared with; optional
 };
 
 /// One vertex attribute: value = offset + scale × integer for the quantised semantics.
-/// `bytes` is meshoptimizer's vertex codec, then zstd; `stride` × vertex_count bytes when decoded.
+/// `bytes` is one zstd frame of what decoders/vertex_prediction.hpp leaves of the values.
 struct VertexStream {
   Semantic semantic = Semantic::kPosition;
-  std::uint8_t stride = 8;  ///< bytes per vertex, a multiple of 4
+  std::uint8_t stride = 8;  ///< bytes per vertex, 2, 4 or 8
   std::array<float, 3> offset{};
   std::array<float, 3> scale{1, 1, 1};
   std::vector<std::uint8_t> bytes;

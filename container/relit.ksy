@@ -275,7 +275,7 @@ types:
         repeat-expr: num_morph_targets
     types:
       stream:
-        doc: meshoptimizer's vertex codec, then zstd; section 3.6.
+        doc: zstd around what prediction leaves of the values; section 3.6.
         seq:
           - id: semantic
             type: u1
@@ -648,6 +648,7 @@ enums:
     4: color
     5: joints
     6: weights
+    7: twin
   pose_kind:
     0: joints
     1: vertices

@@ -14,7 +14,7 @@ std::uint64_t Timeline::Run::start(std::uint64_t number) const {
 }
 
 void Timeline::add(const SegmentRecord& segment) {
-  if (even_) return;
+  if (even_ || segment.first_frame >= frames_) return;
   const auto [at, fresh] = runs_.try_emplace(segment.first_tick);
   Run& run = at->second;
   if (!fresh) {
@@ -23,12 +23,16 @@ void Timeline::add(const SegmentRecord& segment) {
   }
   run.first_frame = segment.first_frame;
   run.first_tick = segment.first_tick;
-  run.frame_count = segment.frame_count;
+  run.frame_count = static_cast<std::uint32_t>(
+      std::min<std::uint64_t>(segment.frame_count, frames_ - segment.first_frame));
   run.ends.clear();
-  run.ends.reserve(segment.durations.size());
-  std::uint64_t tick = segment.first_tick;
-  for (const std::uint32_t ticks : segment.durations) run.ends.push_back(tick += ticks);
-  run.end_tick = segment.first_tick + container::duration_ticks(segment);
+  if (!segment.durations.empty()) {
+    run.ends.reserve(run.frame_count);
+    std::uint64_t tick = segment.first_tick;
+    for (std::uint32_t i = 0; i < run.frame_count; ++i)
+      run.ends.push_back(tick += segment.durations[i]);
+  }
+  run.end_tick = run.end(std::uint64_t{run.frame_count} - 1);
   ticks_.insert_or_assign(segment.first_frame, segment.first_tick);
 }
 

@@ -17,9 +17,12 @@ class Timeline {
  public:
   Timeline() = default;
   explicit Timeline(const ClipRecord& clip)
-      : even_(clip.duration_ticks == clip.frame_count), duration_(clip.duration_ticks) {}
+      : even_(clip.duration_ticks == clip.frame_count),
+        frames_(clip.frame_count),
+        duration_(clip.duration_ticks) {}
 
-  /// What a segment of the clip says. A segment that starts at the same tick is replaced.
+  /// What a segment of the clip says, but for frames that the clip does not have. A segment that
+  /// starts at the same tick is replaced.
   void add(const SegmentRecord& segment);
 
   /// The frame shown at `tick`; nothing where its segment is not known.
@@ -46,6 +49,7 @@ class Timeline {
   [[nodiscard]] const Run* run_of(std::uint64_t frame) const;
 
   bool even_ = true;
+  std::uint64_t frames_ = 0;
   std::uint64_t duration_ = 0;
   std::map<std::uint64_t, Run> runs_;             ///< by first tick
   std::map<std::uint64_t, std::uint64_t> ticks_;  ///< first tick of a run by its first frame

@@ -6,12 +6,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 #include <string>
 #include <utility>
 
 #include "container/base/limits.hpp"
 #include "container/base/out_of_memory.hpp"
 #include "decoders/inflate.hpp"
+#include "decoders/vertex_prediction.hpp"
 
 namespace relit::decoders {
 namespace {
@@ -20,46 +22,48 @@ using container::MeshRecord;
 using container::Semantic;
 using container::VertexStream;
 
-struct SemanticInfo {
-  const char* name;
-  std::uint8_t stride;
-  int dimensions;  ///< that offset and scale apply to
-};
+/// Axes of each semantic that offset and scale apply to.
+constexpr std::array<int, 8> kScaledAxes{3, 0, 2, 2, 0, 0, 0, 0};
 
-constexpr std::array<SemanticInfo, 7> kSemantics{{{"position", 8, 3},
-                                                  {"normal", 4, 0},
-                                                  {"light-map UV", 4, 2},
-                                                  {"albedo UV", 4, 2},
-                                                  {"colour", 4, 0},
-                                                  {"joints", 8, 0},
-                                                  {"weights", 4, 0}}};
-
-/// What a stream's meshoptimizer layer may decompress to: its worst case is a few bytes per group
-/// of vertices above the plain size, so that twice that is generous to any encoder.
+/// What meshoptimizer's layer of the indices may decompress to: its worst case is a few bytes above
+/// the plain size, so that twice that is generous to any encoder.
 std::size_t coded_limit(std::size_t plain_bytes) { return 2 * plain_bytes + 4096; }
-
-std::uint16_t load_u16(const std::uint8_t* p) {
-  return static_cast<std::uint16_t>(p[0] | p[1] << 8);
-}
-std::int16_t load_i16(const std::uint8_t* p) { return static_cast<std::int16_t>(load_u16(p)); }
 
 std::string place(const MeshRecord& record) {
   return "mesh " + std::to_string(record.id) + " (\"" + record.name + "\")";
 }
 
-Result<std::vector<std::uint8_t>> decode_vertex_bytes(const std::vector<std::uint8_t>& bytes,
-                                                      std::size_t count, std::size_t stride,
-                                                      const std::string& what) {
-  RELIT_ASSIGN(const std::vector<std::uint8_t> coded,
-               inflate(bytes, coded_limit(count * stride), what));
-  std::vector<std::uint8_t> out(count * stride);
-  const int code =
-      meshopt_decodeVertexBuffer(out.data(), count, stride, coded.data(), coded.size());
-  if (code != 0) {
-    return fail(ErrorCode::kCorrupt, what + ": meshoptimizer's vertex codec rejects the data (" +
-                                         std::to_string(code) + ")");
+/// The values of a stream as [vertex][component]; what is stored are residuals in planes of bytes,
+/// the low ones of every component, then the high ones.
+Result<std::vector<std::uint16_t>> decode_values(const std::vector<std::uint8_t>& bytes,
+                                                 const VertexStreamForm& form,
+                                                 const VertexLinks& links,
+                                                 const std::string& what) {
+  const std::size_t count = links.of_vertices.size();
+  const std::size_t stored = links.stored(form);
+  const std::size_t components = form.components();
+  RELIT_ASSIGN(const std::vector<std::uint8_t> planes,
+               inflate_exact(bytes, stored * form.stride, what));
+  const std::uint8_t* low = planes.data();
+  const std::uint8_t* high = low + stored * components;
+  std::vector<std::uint16_t> values(count * components);
+  for (std::size_t v = 0, at = 0; v < count; ++v) {
+    if (form.of_points && links.has_twin(v)) {
+      std::copy_n(&values[links.twins[v] * components], components, &values[v * components]);
+      continue;
+    }
+    for (std::size_t c = 0; c < components; ++c) {
+      const std::size_t i = c * stored + at;
+      const auto folded =
+          static_cast<std::uint16_t>(form.value_bytes == 2 ? low[i] | high[i] << 8 : low[i]);
+      const unsigned value = unfold_residual(folded) + 0u +
+                             predict_vertex_value(form, links.neighbours(form, v), values, {v, c});
+      values[v * components + c] =
+          static_cast<std::uint16_t>(form.value_bytes == 2 ? value : value & 255);
+    }
+    ++at;
   }
-  return out;
+  return values;
 }
 
 /// Offset and scale must keep every integer in [lowest, 65535 or 32767] finite and within bounds.
@@ -87,118 +91,153 @@ glm::vec3 decode_octahedral(std::int8_t ex, std::int8_t ey) {
   return n / std::sqrt(glm::dot(n, n));
 }
 
-/// Decodes the streams of one mesh into a Mesh, one after the other.
+/// The twins of a mesh: 0 for none, else 1 more than the folded distance from the last one.
+Result<std::vector<std::uint16_t>> decode_twins(const VertexStream& stream, std::size_t count,
+                                                const std::string& what) {
+  RELIT_ASSIGN(const std::vector<std::uint8_t> planes,
+               inflate_exact(stream.bytes, 2 * count, what));
+  std::vector<std::uint16_t> twins(count, kNoTwin);
+  std::uint16_t last = 0;
+  for (std::size_t v = 0; v < count; ++v) {
+    const auto word = static_cast<std::uint16_t>(planes[v] | planes[count + v] << 8);
+    if (word == 0) continue;
+    const unsigned step = unfold_residual(static_cast<std::uint16_t>(word - 1));
+    last = static_cast<std::uint16_t>(last + step);
+    if (last >= v) {
+      return fail(ErrorCode::kCorrupt, what + ": vertex " + std::to_string(v) + " has the twin " +
+                                           std::to_string(last) + ", which is not before it");
+    }
+    twins[v] = last;
+  }
+  return twins;
+}
+
+/// Decodes the streams of one mesh into a Mesh, one after the other. Its indices are there already.
 class StreamDecoder {
  public:
   StreamDecoder(const MeshRecord& record, std::size_t palette_size, Mesh& mesh)
       : record_(record), palette_size_(palette_size), mesh_(mesh), count_(record.vertex_count) {}
 
   Status run() {
-    for (const VertexStream& stream : record_.streams) RELIT_TRY(decode(stream));
-    if (mesh_.positions.empty() || mesh_.lightmap_uv.empty()) {
-      return fail(ErrorCode::kCorrupt, place(record_) + ": lacks its " +
-                                           (mesh_.positions.empty() ? "position" : "light-map UV") +
-                                           " stream");
+    for (const VertexStream& stream : record_.streams) RELIT_TRY(check(stream));
+    if (seen(Semantic::kPosition) == 0 || seen(Semantic::kLightMapUv) == 0) {
+      return fail(ErrorCode::kCorrupt,
+                  place(record_) + ": lacks its " +
+                      (seen(Semantic::kPosition) == 0 ? "position" : "light-map UV") + " stream");
     }
-    return join_influences();
+    std::vector<std::uint16_t> twins;
+    for (const VertexStream& stream : record_.streams) {
+      if (stream.semantic != Semantic::kTwin) continue;
+      RELIT_ASSIGN(twins, decode_twins(stream, count_, name_of(stream)));
+    }
+    links_ = link_vertices(mesh_.indices, count_, std::move(twins));
+    for (const VertexStream& stream : record_.streams) {
+      if (stream.semantic != Semantic::kTwin) RELIT_TRY(decode(stream));
+    }
+    RELIT_TRY(join_influences());
+    return decode_morph_targets();
   }
 
  private:
-  Status decode(const VertexStream& stream) {
+  std::string name_of(const VertexStream& stream) const {
+    return place(record_) + ", " + form_of(stream.semantic).name + " stream";
+  }
+
+  int& seen(Semantic semantic) { return seen_[static_cast<std::size_t>(semantic)]; }
+
+  Status check(const VertexStream& stream) {
     const auto semantic = static_cast<std::size_t>(stream.semantic);
-    if (semantic >= kSemantics.size()) {
+    if (semantic >= seen_.size()) {
       return fail(ErrorCode::kUnsupported,
                   place(record_) + ": unknown vertex semantic " + std::to_string(semantic));
     }
-    const SemanticInfo& info = kSemantics[semantic];
-    const std::string what = place(record_) + ", " + info.name + " stream";
-    if (stream.stride != info.stride) {
-      return fail(ErrorCode::kCorrupt, what + ": stride " + std::to_string(stream.stride) +
-                                           " instead of " + std::to_string(info.stride));
+    const VertexStreamForm& form = form_of(stream.semantic);
+    if (stream.stride != form.stride) {
+      return fail(ErrorCode::kCorrupt, name_of(stream) + ": stride " +
+                                           std::to_string(stream.stride) + " instead of " +
+                                           std::to_string(form.stride));
     }
     const bool per_influence =
         stream.semantic == Semantic::kJoints || stream.semantic == Semantic::kWeights;
-    if (++seen_[semantic] > (per_influence ? 2 : 1)) {
-      return fail(ErrorCode::kCorrupt, what + ": occurs too often");
+    if (++seen(stream.semantic) > (per_influence ? 2 : 1)) {
+      return fail(ErrorCode::kCorrupt, name_of(stream) + ": occurs too often");
     }
-    RELIT_TRY(check_range(stream.offset, stream.scale, info.dimensions, 0.0f, 65535.0f, what));
-    RELIT_ASSIGN(std::vector<std::uint8_t> bytes,
-                 decode_vertex_bytes(stream.bytes, count_, stream.stride, what));
-    return store(stream, std::move(bytes));
+    return check_range(stream.offset, stream.scale, kScaledAxes[semantic], 0.0f, 65535.0f,
+                       name_of(stream));
   }
 
-  Status store(const VertexStream& stream, std::vector<std::uint8_t> bytes) {
+  Status decode(const VertexStream& stream) {
+    RELIT_ASSIGN(const std::vector<std::uint16_t> values,
+                 decode_values(stream.bytes, form_of(stream.semantic), links_, name_of(stream)));
     switch (stream.semantic) {
       case Semantic::kPosition:
-        store_positions(stream, bytes);
+        store_positions(stream, values);
         break;
       case Semantic::kNormal:
-        store_normals(bytes);
+        store_normals(values);
         break;
       case Semantic::kLightMapUv:
-        store_uv(stream, bytes, mesh_.lightmap_uv);
+        store_uv(stream, values, mesh_.lightmap_uv);
         for (glm::vec2& uv : mesh_.lightmap_uv) uv = glm::clamp(uv, 0.0f, 1.0f);
         break;
       case Semantic::kAlbedoUv:
-        store_uv(stream, bytes, mesh_.albedo_uv);
+        store_uv(stream, values, mesh_.albedo_uv);
         break;
       case Semantic::kColor:
         mesh_.colors.resize(count_);
         for (std::size_t v = 0; v < count_; ++v) {
-          const std::uint8_t* p = &bytes[v * 4];
+          const std::uint16_t* p = &values[v * 4];
           mesh_.colors[v] = {p[0], p[1], p[2], p[3]};
         }
         break;
       case Semantic::kJoints:
-        return store_joints(bytes);
+        return store_joints(values);
       case Semantic::kWeights:
-        weights_.push_back(std::move(bytes));
+        weights_.push_back(values);
+        break;
+      case Semantic::kTwin:
         break;
     }
     return {};
   }
 
-  void store_positions(const VertexStream& stream, const std::vector<std::uint8_t>& bytes) {
+  void store_positions(const VertexStream& stream, std::span<const std::uint16_t> values) {
     const glm::vec3 offset(stream.offset[0], stream.offset[1], stream.offset[2]);
     const glm::vec3 scale(stream.scale[0], stream.scale[1], stream.scale[2]);
     mesh_.positions.resize(count_);
     for (std::size_t v = 0; v < count_; ++v) {
-      const std::uint8_t* p = &bytes[v * 8];
-      mesh_.positions[v] =
-          offset + scale * glm::vec3(load_u16(p), load_u16(p + 2), load_u16(p + 4));
+      const std::uint16_t* p = &values[v * 4];
+      mesh_.positions[v] = offset + scale * glm::vec3(p[0], p[1], p[2]);
     }
   }
 
-  void store_normals(const std::vector<std::uint8_t>& bytes) {
+  void store_normals(std::span<const std::uint16_t> values) {
     mesh_.normals.resize(count_);
     for (std::size_t v = 0; v < count_; ++v) {
-      mesh_.normals[v] = decode_octahedral(static_cast<std::int8_t>(bytes[v * 4]),
-                                           static_cast<std::int8_t>(bytes[v * 4 + 1]));
+      mesh_.normals[v] = decode_octahedral(static_cast<std::int8_t>(values[v * 4]),
+                                           static_cast<std::int8_t>(values[v * 4 + 1]));
     }
   }
 
-  void store_uv(const VertexStream& stream, const std::vector<std::uint8_t>& bytes,
+  void store_uv(const VertexStream& stream, std::span<const std::uint16_t> values,
                 std::vector<glm::vec2>& out) const {
     const glm::vec2 offset(stream.offset[0], stream.offset[1]);
     const glm::vec2 scale(stream.scale[0], stream.scale[1]);
     out.resize(count_);
     for (std::size_t v = 0; v < count_; ++v) {
-      const std::uint8_t* p = &bytes[v * 4];
-      out[v] = offset + scale * glm::vec2(load_u16(p), load_u16(p + 2));
+      out[v] = offset + scale * glm::vec2(values[v * 2], values[v * 2 + 1]);
     }
   }
 
-  Status store_joints(const std::vector<std::uint8_t>& bytes) {
-    std::vector<std::uint16_t> joints(count_ * 4);
+  Status store_joints(const std::vector<std::uint16_t>& joints) {
     for (std::size_t i = 0; i < joints.size(); ++i) {
-      joints[i] = load_u16(&bytes[i * 2]);
       if (joints[i] >= palette_size_) {
         return fail(ErrorCode::kCorrupt, place(record_) + ", vertex " + std::to_string(i / 4) +
                                              ": joint " + std::to_string(joints[i]) +
                                              " of a palette of " + std::to_string(palette_size_));
       }
     }
-    joints_.push_back(std::move(joints));
+    joints_.push_back(joints);
     return {};
   }
 
@@ -233,13 +272,34 @@ class StreamDecoder {
     return {};
   }
 
+  Status decode_morph_targets() {
+    mesh_.first_morph_weight = record_.first_morph_weight;
+    mesh_.morph_targets.reserve(record_.morph_targets.size());
+    for (const container::MorphTarget& target : record_.morph_targets) {
+      const std::string what =
+          place(record_) + ", morph target " + std::to_string(mesh_.morph_targets.size());
+      RELIT_TRY(check_range({}, target.scale, 3, -32768.0f, 32767.0f, what));
+      RELIT_ASSIGN(const std::vector<std::uint16_t> values,
+                   decode_values(target.bytes, morph_target_form(), links_, what));
+      const glm::vec3 scale(target.scale[0], target.scale[1], target.scale[2]);
+      std::vector<glm::vec3>& offsets = mesh_.morph_targets.emplace_back(count_);
+      for (std::size_t v = 0; v < count_; ++v) {
+        const std::uint16_t* p = &values[v * 4];
+        offsets[v] =
+            scale * glm::vec3(static_cast<std::int16_t>(p[0]), static_cast<std::int16_t>(p[1]),
+                              static_cast<std::int16_t>(p[2]));
+      }
+    }
+    return {};
+  }
+
   const MeshRecord& record_;
   std::size_t palette_size_;
   Mesh& mesh_;
   std::size_t count_;
-  std::array<int, kSemantics.size()> seen_{};
-  std::vector<std::vector<std::uint16_t>> joints_;
-  std::vector<std::vector<std::uint8_t>> weights_;
+  std::array<int, kScaledAxes.size()> seen_{};
+  VertexLinks links_;
+  std::vector<std::vector<std::uint16_t>> joints_, weights_;
 };
 
 Status check_counts(const MeshRecord& record, std::size_t morph_weight_count) {
@@ -298,25 +358,6 @@ Status decode_indices(const MeshRecord& record, Mesh& mesh) {
   return {};
 }
 
-Status decode_morph_targets(const MeshRecord& record, Mesh& mesh) {
-  mesh.first_morph_weight = record.first_morph_weight;
-  mesh.morph_targets.reserve(record.morph_targets.size());
-  for (const container::MorphTarget& target : record.morph_targets) {
-    const std::string what =
-        place(record) + ", morph target " + std::to_string(mesh.morph_targets.size());
-    RELIT_TRY(check_range({}, target.scale, 3, -32768.0f, 32767.0f, what));
-    RELIT_ASSIGN(const std::vector<std::uint8_t> bytes,
-                 decode_vertex_bytes(target.bytes, record.vertex_count, 8, what));
-    const glm::vec3 scale(target.scale[0], target.scale[1], target.scale[2]);
-    std::vector<glm::vec3>& offsets = mesh.morph_targets.emplace_back(record.vertex_count);
-    for (std::size_t v = 0; v < offsets.size(); ++v) {
-      const std::uint8_t* p = &bytes[v * 8];
-      offsets[v] = scale * glm::vec3(load_i16(p), load_i16(p + 2), load_i16(p + 4));
-    }
-  }
-  return {};
-}
-
 }  // namespace
 
 Result<Mesh> decode_mesh(const container::MeshRecord& record, std::size_t palette_size,
@@ -327,9 +368,8 @@ Result<Mesh> decode_mesh(const container::MeshRecord& record, std::size_t palett
     mesh.name = record.name;
     mesh.id = record.id;
     mesh.material_id = record.material_id;
-    RELIT_TRY(StreamDecoder(record, palette_size, mesh).run());
-    RELIT_TRY(decode_morph_targets(record, mesh));
     RELIT_TRY(decode_indices(record, mesh));
+    RELIT_TRY(StreamDecoder(record, palette_size, mesh).run());
     return mesh;
   });
 }

@@ -28,7 +28,7 @@ namespace {
 constexpr const char* kWrapNames[] = {"repeat", "clamp", "mirror"};
 constexpr const char* kAlphaNames[] = {"opaque", "mask", "blend"};
 constexpr const char* kSemanticNames[] = {"position", "normal", "lightmap_uv", "albedo_uv",
-                                          "color",    "joints", "weights"};
+                                          "color",    "joints", "weights",     "twin"};
 constexpr const char* kTargetNames[] = {"translation", "rotation", "scale", "morph_weight"};
 
 template <class Enum>

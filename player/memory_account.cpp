@@ -102,6 +102,8 @@ std::uint64_t decoded_bytes(const MeshRecord& mesh) {
       case Semantic::kWeights:
         a_vertex += 4 * sizeof(float);
         break;
+      case Semantic::kTwin:
+        break;
     }
   }
   a_vertex += mesh.morph_targets.size() * sizeof(glm::vec3);

@@ -197,6 +197,72 @@ TEST_CASE("a target is met by the file that is written, as its dump is measured"
   CHECK_FALSE(bake::bake(options, quiet));
 }
 
+TEST_CASE("of every second frame a file holds half, at half the rate") {
+  const Folder folder;
+  BakeOptions options = small_bake(folder, "half.relit");
+  options.max_frames = 6;
+  options.reference = folder.path / "reference.npy";
+  options.coding.frame_step = 2, options.coding.lossless = true;
+  const BakeSummary summary = must_bake(options);
+  CHECK(summary.frames == 3);
+  CHECK(summary.frame_rate == container::Rational{25, 1});
+  const Decoded file = decode(options.output);
+  CHECK(file.contents.clips.front().tick_rate == container::Rational{25, 1});
+  CHECK(file.contents.clips.front().frame_count == 3);
+  const auto reference = decoders::read_npy(options.reference);
+  REQUIRE(reference);
+  const std::size_t plane = 64 * 64, frame = 27 * plane;
+  REQUIRE(reference->values.size() == 6 * frame);
+  double worst = 0;
+  for (std::size_t i = 0; i < file.transfer.size(); ++i) {
+    const std::size_t k = i / frame, p = i % frame / plane;
+    const double bound =
+        quantiser_bound(file.contents.layers, static_cast<int>(p / 3), static_cast<int>(p % 3), 0);
+    const float truth = reference->values[2 * k * frame + i % frame];
+    worst = std::max(worst, std::abs(static_cast<double>(file.transfer[i] - truth)) / bound);
+  }
+  // The bound, and what single precision adds to it.
+  CHECK(worst <= 1.001);
+  CHECK(worst > 0.5);
+  options.coding.frame_step = 4;
+  Progress quiet(true);
+  const auto odd = bake::bake(options, quiet);
+  REQUIRE(!odd);
+  CHECK(odd.error().message.find("must divide the clip's 6 frames") != std::string::npos);
+}
+
+TEST_CASE("what a target says of blended frames is what they are", "[long]") {
+  const Folder folder;
+  BakeOptions options = small_bake(folder, "blended.relit");
+  options.max_frames = 6;
+  options.reference = folder.path / "reference.npy";
+  options.coding.frame_step = 2, options.coding.planes = Planes::kColour;
+  options.goal = Goal{Goal::Kind::kPsnr, 32};
+  const BakeSummary summary = must_bake(options);
+  REQUIRE(summary.choice);
+  const auto reference = decoders::read_npy(options.reference);
+  REQUIRE(reference);
+  const Decoded file = decode(options.output);
+  const std::size_t frame = file.transfer.size() / 3;
+  REQUIRE(reference->values.size() == 6 * frame);
+  BakeOptions prepared_options = options;
+  const auto prepared = prepare_bake(prepared_options);
+  REQUIRE(prepared);
+  std::vector<std::uint8_t> covered(64 * 64, 0);
+  for (const TexelSample& sample : prepared->samples) covered[sample.texel] = sample.covered;
+  decoders::RelitError error(decoders::standard_lights(), 9, covered);
+  std::vector<float> shown(frame);
+  for (std::size_t k = 0; k < 6; ++k) {
+    // The clip loops: the last frame is blended into the first.
+    const std::size_t from = k / 2, to = (from + k % 2) % 3;
+    for (std::size_t v = 0; v < frame; ++v)
+      shown[v] = (file.transfer[from * frame + v] + file.transfer[to * frame + v]) / 2;
+    error.add_frame(std::span(reference->values).subspan(k * frame, frame), shown);
+  }
+  // Sums of floats in another order.
+  CHECK(error.figures().psnr_db == Approx(summary.choice->trial.figures.psnr_db).margin(1e-3));
+}
+
 TEST_CASE("T_0 of every texel and frame is physical") {
   const Folder folder;
   BakeOptions options = small_bake(folder, "bounds.relit");

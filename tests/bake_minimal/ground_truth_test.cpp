@@ -20,7 +20,7 @@ namespace {
 
 constexpr int kOrder = 2;
 constexpr int kCoefficients = 9;
-constexpr int kSeeds = 12;    // independent sets of fixed directions, to know their error
+constexpr int kSeeds = 8;     // independent sets of fixed directions, to know their error
 constexpr int kTexels = 70;   // a frame
 constexpr int kPaths = 2048;  // a texel
 

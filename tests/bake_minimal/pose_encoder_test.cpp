@@ -113,12 +113,12 @@ TEST_CASE("a chain of joints stays within the bound of its quantisers") {
     // The sheet is 2 long and its root scales by 1.5, so nothing is longer than 4.5 and a step of
     // the surface is at most s = 4.5 / 2^14 = 2.7e-4. Each joint of the chain adds to a vertex:
     // rotation √3·s/w, with w >= 0.9 for angles up to 0.6 rad (1.93 s); the first one's translation
-    // √3·s/2; the last one's scale s·√3/2. Positions: half of 2/16383 on three axes, times 1.5·1.25
-    // (2.0e-4). Weights: eight of them off by less than 1/255 each, and matrices that differ by
+    // √3·s/2; the last one's scale s·√3/2. Positions: half of 2/4095 on three axes, times 1.5·1.25
+    // (8.0e-4). Weights: eight of them off by less than 1/255 each, and matrices that differ by
     // what neighbours part, which rounding shares; their sum of errors is 0, and joints lie
     // within 4.5 of each other, with half of influences/255 changing hands at most.
     const double s = 4.5 / 16384;
-    const double chain = joints * 1.93 * s + 2 * 0.87 * s + 2.0e-4;
+    const double chain = joints * 1.93 * s + 2 * 0.87 * s + 8.0e-4;
     const double weights = influences / 2 / 255.0 * 4.5;
     CHECK(error < chain + weights);
 
@@ -253,9 +253,9 @@ TEST_CASE("morph weights are channels, and those that rest elsewhere than at zer
   REQUIRE(encoding.track.channels.size() == 2);
   CHECK(encoding.track.channels[1].offset[0] == 0.5f);
   const double error = largest_error(scene, pack, decoded(pack, encoding, 11, 25), times);
-  // Half steps: positions and two targets √3·(2/16383)/2 each, the weight's half step of the
+  // Half steps: positions and two targets √3·(2/4095)/2 each, the weight's half step of the
   // surface twice, for the sheet grows to at most 3: 3/16384/2.
-  CHECK(error < 3 * 1.06e-4 + 2 * 0.92e-4);
+  CHECK(error < 3 * 4.24e-4 + 2 * 0.92e-4);
 }
 
 TEST_CASE("auto takes the smaller kind and says what both cost") {

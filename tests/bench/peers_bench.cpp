@@ -119,7 +119,7 @@ std::vector<half> halves(std::span<const float> values) {
 Imf::FrameBuffer frame_buffer(const Clip& clip, half* planes) {
   Imf::FrameBuffer buffer;
   for (std::size_t p = 0; p < clip.planes(); ++p) {
-    char name[16];
+    char name[40];
     std::snprintf(name, sizeof name, "T%02zu.%c", p / 3, "RGB"[p % 3]);
     buffer.insert(name, Imf::Slice(Imf::HALF, reinterpret_cast<char*>(planes + p * clip.texels()),
                                    sizeof(half), sizeof(half) * clip.width));

@@ -125,14 +125,21 @@ VertexStream words(Semantic semantic, std::uint8_t stride, std::vector<std::uint
                    std::array<float, 3> scale = {1, 1, 1}) {
   std::vector<std::uint8_t> bytes;
   for (const std::uint16_t v : values) bake::append_u16(bytes, v);
-  return {semantic, stride, {}, scale, bake::encode_vertex_stream(bytes, stride)};
+  return {semantic, stride, {}, scale, quad_stream(semantic, bytes)};
 }
 
 VertexStream octets(Semantic semantic, const std::vector<std::uint8_t>& bytes) {
-  return {semantic, 4, {}, {1, 1, 1}, bake::encode_vertex_stream(bytes, 4)};
+  return {semantic, 4, {}, {1, 1, 1}, quad_stream(semantic, bytes)};
 }
 
 }  // namespace
+
+std::vector<std::uint8_t> quad_stream(Semantic semantic, std::span<const std::uint8_t> bytes,
+                                      std::vector<std::uint16_t> twins) {
+  const std::vector<std::uint16_t> indices{0, 1, 2, 0, 2, 3};
+  return bake::encode_vertex_stream(bytes, decoders::form_of(semantic),
+                                    decoders::link_vertices(indices, 4, std::move(twins)));
+}
 
 MeshRecord quad(int influences) {
   MeshRecord mesh;

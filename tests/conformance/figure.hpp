@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "bake_minimal/coding_options.hpp"
@@ -40,6 +41,11 @@ Draft clip_parts(const FigureOptions& options, std::uint32_t first_segment = 0);
 
 /// Four vertices, two triangles, joints and weights; `influences` 0, 4 or 8.
 container::MeshRecord quad(int influences = 4);
+/// The bytes of a vertex stream of quad(); those of a morph target are coded like positions.
+/// `twins`: none, or one a vertex.
+std::vector<std::uint8_t> quad_stream(container::Semantic semantic,
+                                      std::span<const std::uint8_t> bytes,
+                                      std::vector<std::uint16_t> twins = {});
 container::SkeletonRecord two_joints();
 /// Rotation of node 1 over the clip: record, and one packet for `frames` frames from `first`.
 container::PoseTrackRecord bending(const ClipIds& ids);

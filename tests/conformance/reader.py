@@ -8,6 +8,8 @@ were lost). frames prints hashes of decoded planes, coefficients at probe texels
 import collections, contextlib, ctypes, ctypes.util, io, itertools, json, math, pathlib, re, struct
 import sys, zlib
 
+from reader_streams import *
+
 SIGNATURE, MARKER = b"\x89RLT\r\n\x1a\n", bytes.fromhex("F3529C0BE6D17A38C41FA9650EB2875D")
 # The static types behind HEAD in their order: names in INFO.md, and how many a file may have.
 STATIC = {"CLIP": ("clips", 1024), "IMAG": ("images", 4096), "MATL": ("materials", 4096),
@@ -15,17 +17,10 @@ STATIC = {"CLIP": ("clips", 1024), "IMAG": ("images", 4096), "MATL": ("materials
           "MODL": ("models", 256), "LAYR": ("layers", 256)}
 ORDER = ["HEAD", *STATIC, "SEGM", "INDX", "FEND"]
 
-class Refuse(ValueError):
-    """The file, or a part of it, must not be used."""
-
 class Framing(Refuse): """The framing is lost at this place."""
 
-def signed(zigzag): return zigzag >> 1 ^ -(zigzag & 1)
 def affine(offset, step, integers): return [o + k * i for o, k, i in zip(offset, step, integers)]
 def distinct(values): return len(set(values := list(values))) == len(values)
-
-def need(condition, what, error=Refuse):
-    if not condition: raise error(what)
 
 # Payloads, section 4 ------------------------------------------------------------------------------
 # A layout lists fields as name:code, the code being one of struct's, string, bytes, bool, another
@@ -42,7 +37,8 @@ MATL id:I name:string base_color:4f=0..1 image:i=-1..2147483647 wrap:/repeat/cla
   linear_filter:bool alpha_mode:/opaque/mask/blend alpha_cutoff:f=0..inf
 MESH id:I name:string material:I vertices:I=1..65535 index_count:I=1..3145728 streams:stream[16]
   indices:bytes=1..inf first_morph_weight:I morph_targets:target[1024]
-stream semantic:/position/normal/lightmap_uv/albedo_uv/color/joints/weights stride:B
+stream semantic:/position/normal/lightmap_uv/albedo_uv/color/joints/weights/twin
+  stride:B
   offset:3f scale:3f=0..inf data:bytes=1..inf
 target scale:3f=0..inf data:bytes=1..inf
 SKEL morph_weights:I=0..65535 nodes:node[65535] palette:joint[65535]
@@ -135,8 +131,10 @@ SOUND = {
     "CLIP": lambda d: d["frames"] <= d["duration_ticks"] and all(map(float.__le__, *d["bounds"])),
     "MESH": lambda d: (n := collections.Counter(s["semantic"] for s in d["streams"])) and (
         d["index_count"] % 3 == 0 and n["position"] == n["lightmap_uv"] == 1
-        and n["joints"] == n["weights"] <= 2 and max(n["normal"], n["albedo_uv"], n["color"]) <= 1),
-    "stream": lambda d: d["stride"] == (8 if d["semantic"] in ("position", "joints") else 4),
+        and n["joints"] == n["weights"] <= 2
+        and max(n["normal"], n["albedo_uv"], n["color"], n["twin"]) <= 1),
+    "stream": lambda d: (
+        d["stride"] == {"position": 8, "joints": 8, "twin": 2}.get(d["semantic"], 4)),
     "SKEL": lambda d: (all(n["parent"] < i for i, n in enumerate(d["nodes"]))
                        and all(joint["node"] < len(d["nodes"]) for joint in d["palette"])),
     "POSE": lambda d: distinct([r["node"] for r in d["rest"]]) and (
@@ -454,45 +452,35 @@ def show_model(file, model, count):
     return {"model": model["id"], "clip": model["clip"], "probe_texels": probes, "frames": shown}
 
 # Meshes and poses, sections 3.5 and 3.6 -----------------------------------------------------------
-def unzstd(raw, least, most):
-    """The one zstd frame in raw, which states a size between these."""
-    z, length = ctypes.CDLL("libzstd.so.1"), ctypes.c_size_t(len(raw))
-    z.ZSTD_getFrameContentSize.restype = ctypes.c_ulonglong
-    size = z.ZSTD_getFrameContentSize(raw, length)
-    need(least <= size <= most and z.ZSTD_findFrameCompressedSize(raw, length) == len(raw), "zstd")
-    out = ctypes.create_string_buffer(size)
-    need(z.ZSTD_decompress(out, ctypes.c_size_t(size), raw, length) == size, "zstd: damaged")
-    return out.raw
-
-def meshopt(raw, count, layout, codec="VertexBuffer", first=b"\xa0"):
-    """The entries of a stream, or the indices, by struct's layout."""
-    stride, size_t = struct.calcsize(layout), ctypes.c_size_t
-    raw = unzstd(raw, 1, 2 * count * stride + 4096)
-    out = ctypes.create_string_buffer(count * stride)
-    call = ctypes.CDLL("libmeshoptimizer.so")[f"meshopt_decode{codec}"]
-    need(raw[:1] == first and not call(out, size_t(count), size_t(stride), raw, size_t(len(raw))),
-         "meshoptimizer: another format, or damaged")
-    return list(struct.iter_unpack(layout, out.raw))
-
 def bounded(offset, step, top=65535, limit=1e9):
     need(all(abs(o) <= limit and abs(o + k * top) <= limit for o, k in zip(offset, step)), "bounds")
 
 def open_mesh(mesh, palette):
     """First four vertices: (position, morph deltas, [(palette entry, weight)]); checks all."""
     count, streams = mesh["vertices"], collections.defaultdict(list)
-    indices = meshopt(mesh["indices"], mesh["index_count"], "<I", "IndexBuffer", b"\xe1")
-    need(max(indices)[0] < count, "an index too large")
+    corners = meshopt_indices(mesh["indices"], mesh["index_count"])
+    need(max(corners) < count, "an index too large")
+    twins, points, none = [None] * count, [], [None] * count
+    for s in mesh["streams"]:
+        if s["semantic"] == "twin": twins = read_twins(s["data"], count)
+    for v, twin in enumerate(twins): points.append(v if twin is None else points[twin])
+    of_vertices = neighbours(corners, count)
+    of_points = neighbours([points[v] for v in corners], count)
     for s in mesh["streams"]:
         axes = {"position": 3, "lightmap_uv": 2, "albedo_uv": 2}.get(s["semantic"], 0)
         bounded(s["offset"][:axes], s["scale"])
-        values = meshopt(s["data"], count, "<4H" if s["stride"] == 8 else "<4B")
+        if s["semantic"] == "twin": continue
+        links = (none, of_vertices) if "uv" in s["semantic"] else (twins, of_points)
+        values = read_stream(s["data"], s["semantic"], s["stride"], *links)
         streams[s["semantic"]].append(values)
         if s["semantic"] == "position":
             positions = [affine(s["offset"], s["scale"], v) for v in values[:4]]
     need(all(max(v) < palette for s in streams["joints"] for v in s), "joint beyond the palette")
     need(all(sum(map(sum, v)) == 255 for v in zip(*streams["weights"])), "weights are not 255")
-    targets = [(t["scale"], meshopt(t["data"], count, "<4h")) for t in mesh["morph_targets"]]
-    return [(p, [affine((0, 0, 0), scale, values[i]) for scale, values in targets],
+    targets = [(t["scale"], read_stream(t["data"], "target", 8, twins, of_points))
+               for t in mesh["morph_targets"]]
+    return [(p, [affine((0, 0, 0), scale, [(x ^ 0x8000) - 0x8000 for x in values[i]])
+                 for scale, values in targets],
              [pair for joints, weights in zip(streams["joints"], streams["weights"])
               for pair in zip(joints[i], weights[i]) if pair[1]])
             for i, p in enumerate(positions)]

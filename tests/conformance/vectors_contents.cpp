@@ -14,6 +14,8 @@ using namespace container;
 
 namespace {
 
+constexpr std::uint16_t kNone = decoders::kNoTwin;
+
 std::vector<std::uint8_t> words(const std::vector<unsigned>& values) {
   std::vector<std::uint8_t> bytes;
   for (const unsigned v : values) bake::append_u16(bytes, v);
@@ -57,13 +59,30 @@ void add_meshes(Vectors& vectors) {
   });
   mesh(vectors, "mesh-joint-beyond", "a joint beyond the palette", [](M& m) {
     m.streams[2].bytes =
-        bake::encode_vertex_stream(words({2, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0}), 8);
+        quad_stream(Semantic::kJoints, words({2, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0}));
   });
   mesh(vectors, "mesh-weights-sum", "weights that sum to 254", [](M& m) {
     std::vector<std::uint8_t> weights(16, 0);
     for (std::size_t v = 0; v < 4; ++v) weights[4 * v] = 254;
-    m.streams[3].bytes = bake::encode_vertex_stream(weights, 4);
+    m.streams[3].bytes = quad_stream(Semantic::kWeights, weights);
   });
+  mesh(vectors, "mesh-twin-later", "a twin that does not come before its vertex", [](M& m) {
+    // Folded 4 is 2 more than 0, of vertex 2.
+    m.streams.push_back({Semantic::kTwin,
+                         2,
+                         {},
+                         {1, 1, 1},
+                         bake::deflate(std::vector<std::uint8_t>{0, 0, 5, 0, 0, 0, 0, 0})});
+  });
+  mesh(vectors, "mesh-twin-unused", "streams of four points beside a stream of twins for three",
+       [](M& m) {
+         m.streams.push_back(
+             {Semantic::kTwin,
+              2,
+              {},
+              {1, 1, 1},
+              bake::encode_twins(std::vector<std::uint16_t>{kNone, kNone, kNone, 2})});
+       });
   mesh(vectors, "mesh-beyond-bounds", "a scale that leads beyond 10^9",
        [](M& m) { m.streams[0].scale[0] = 1e6f; });
   from_draft(vectors, "image-garbage", "an image that is no PNG", faulty({"DECODE_IMAGE"}),

@@ -24,7 +24,7 @@ MorphTarget raised(float scale) {
   for (const unsigned z : {0u, 100u, 65436u, 7u}) {
     for (const unsigned word : {1u, 65535u, z, 0u}) bake::append_u16(bytes, word);
   }
-  return {{scale, scale, scale}, bake::encode_vertex_stream(bytes, 8)};
+  return {{scale, scale, scale}, quad_stream(Semantic::kPosition, bytes)};
 }
 
 void add_rigs(Vectors& vectors) {
@@ -74,16 +74,50 @@ void add_rigs(Vectors& vectors) {
     set_pose(d, pose, 0);
   });
   good(vectors, "mesh-all-streams", "normals, albedo UVs and colours", [](Draft& d) {
-    const auto four = [](std::initializer_list<std::uint8_t> vertex) {
+    const auto four = [](Semantic semantic, std::initializer_list<std::uint8_t> vertex) {
       std::vector<std::uint8_t> bytes;
       for (int v = 0; v < 4; ++v) bytes.insert(bytes.end(), vertex);
-      return bake::encode_vertex_stream(bytes, 4);
+      return quad_stream(semantic, bytes);
     };
     auto& streams = d.meshes[0].streams;
-    streams.push_back({Semantic::kNormal, 4, {}, {1, 1, 1}, four({0, 127, 0, 0})});
-    streams.push_back({Semantic::kAlbedoUv, 4, {-1, 2, 0}, {1e-3f, 1e-3f, 1}, four({1, 2, 3, 4})});
-    streams.push_back({Semantic::kColor, 4, {}, {1, 1, 1}, four({255, 128, 0, 200})});
+    streams.push_back(
+        {Semantic::kNormal, 4, {}, {1, 1, 1}, four(Semantic::kNormal, {0, 127, 0, 0})});
+    streams.push_back({Semantic::kAlbedoUv,
+                       4,
+                       {-1, 2, 0},
+                       {1e-3f, 1e-3f, 1},
+                       four(Semantic::kAlbedoUv, {1, 2, 3, 4})});
+    streams.push_back(
+        {Semantic::kColor, 4, {}, {1, 1, 1}, four(Semantic::kColor, {255, 128, 0, 200})});
   });
+  good(
+      vectors, "mesh-twins", "a vertex that shares everything but its UVs with another",
+      [](Draft& d) {
+        // The last vertex is the first one once more, with UVs of its own: the second triangle is
+        // closed.
+        const std::vector<std::uint16_t> twins{decoders::kNoTwin, decoders::kNoTwin,
+                                               decoders::kNoTwin, 0};
+        std::vector<std::uint8_t> corners, joints;
+        for (const unsigned word :
+             {0u, 0u, 0u, 0u, 1024u, 0u, 9u, 0u, 1024u, 1024u, 65535u, 0u, 0u, 0u, 0u, 0u})
+          bake::append_u16(corners, word);
+        for (const unsigned word : {0u, 1u, 0u, 0u, 1u, 0u, 0u, 0u, 1u, 0u, 0u, 0u, 0u, 1u, 0u, 0u})
+          bake::append_u16(joints, word);
+        const std::vector<std::uint8_t> weights{200, 55, 0, 0, 255, 0,  0, 0,
+                                                255, 0,  0, 0, 200, 55, 0, 0};
+        for (auto& stream : d.meshes[0].streams) {
+          if (stream.semantic == Semantic::kPosition) {
+            stream.scale[2] = 1e-6f;
+            stream.bytes = quad_stream(stream.semantic, corners, twins);
+          }
+          if (stream.semantic == Semantic::kJoints)
+            stream.bytes = quad_stream(stream.semantic, joints, twins);
+          if (stream.semantic == Semantic::kWeights)
+            stream.bytes = quad_stream(stream.semantic, weights, twins);
+        }
+        d.meshes[0].streams.push_back(
+            {Semantic::kTwin, 2, {}, {1, 1, 1}, bake::encode_twins(twins)});
+      });
   good(vectors, "mesh-padding", "what stands in the place of zeros means nothing", [](Draft& d) {
     // A square of seven steps, and a normal along +Y.
     const std::vector<std::uint8_t> corners{0, 0, 0, 0, 0, 0, 9, 1, 7, 0, 0, 0, 0, 0, 255, 255,
@@ -95,10 +129,10 @@ void add_rigs(Vectors& vectors) {
       if (stream.semantic != Semantic::kPosition) continue;
       stream.offset = {0, 0, 0};
       stream.scale = {0.125f, 0.125f, 0.125f};
-      stream.bytes = bake::encode_vertex_stream(corners, 8);
+      stream.bytes = quad_stream(Semantic::kPosition, corners);
     }
     streams.push_back(
-        {Semantic::kNormal, 4, {}, {1, 1, 1}, bake::encode_vertex_stream(normals, 4)});
+        {Semantic::kNormal, 4, {}, {1, 1, 1}, quad_stream(Semantic::kNormal, normals)});
   });
 }
 

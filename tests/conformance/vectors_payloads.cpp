@@ -128,7 +128,12 @@ void add_mesh(Vectors& vectors) {
                  {"mesh-stream-empty", "a stream without bytes", "MESH_CORRUPT",
                   [](Draft& d) { d.meshes[0].streams[0].bytes.clear(); }},
                  {"mesh-semantic", "an unknown semantic", "MESH_UNSUPPORTED",
-                  [](Draft& d) { d.meshes[0].streams[0].semantic = Semantic{7}; }},
+                  [](Draft& d) { d.meshes[0].streams[0].semantic = Semantic{8}; }},
+                 {"mesh-two-twins", "two streams of twins", "MESH_CORRUPT",
+                  [](Draft& d) {
+                    d.meshes[0].streams.resize(d.meshes[0].streams.size() + 2,
+                                               {Semantic::kTwin, 2, {}, {1, 1, 1}, {1}});
+                  }},
                  {"mesh-streams-limit", "seventeen streams", "MESH_LIMIT",
                   [](Draft& d) { d.meshes[0].streams.resize(17, d.meshes[0].streams[0]); }},
                  {"mesh-morph-scale", "a morph target of negative scale", "MESH_CORRUPT",

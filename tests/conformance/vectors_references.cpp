@@ -174,6 +174,11 @@ void add_segments(Vectors& vectors) {
   from_draft(vectors, "segment-frames", "frames beyond the end of the clip",
              faulty({"SEGM_FRAMES"}),
              [](Draft& d) { d.clips[0].frame_count = d.clips[0].duration_ticks = 2; });
+  from_draft(vectors, "segment-frames-uneven", "likewise where frames are not evenly spaced",
+             faulty({"SEGM_FRAMES", "SEGM_DURATION"}), [](Draft& d) {
+               d.clips[0].frame_count = 2;
+               d.clips[0].duration_ticks = 10;
+             });
   from_draft(vectors, "segment-ticks", "a first tick that is not that of the frames before",
              faulty({"SEGM_TICKS", "SEGM_DURATION"}),
              [](Draft& d) { d.segments[1].record.first_tick = 1; });

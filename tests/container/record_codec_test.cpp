@@ -203,7 +203,7 @@ TEST_CASE("meshes that make no sense are refused") {
   REFUSED(kCorrupt, mesh, r.streams[0].offset[0] = kNan);
   REFUSED(kCorrupt, mesh, r.streams[0].scale[0] = -1);
   REFUSED(kCorrupt, mesh, r.streams[0].bytes.clear());
-  REFUSED(kUnsupported, mesh, r.streams[1].semantic = static_cast<Semantic>(7));
+  REFUSED(kUnsupported, mesh, r.streams[1].semantic = static_cast<Semantic>(8));
   REFUSED(kLimit, mesh, r.streams.resize(limits::kVertexStreams + 1, r.streams[0]));
   REFUSED(kCorrupt, mesh, r.indices.clear());
   REFUSED(kLimit, mesh, r.first_morph_weight = limits::kMorphWeights);

@@ -111,8 +111,8 @@ TEST_CASE("the index knows when its segments begin") {
 TEST_CASE("segments of many frames cost no more than their records") {
   // As ticks of each frame these would take 32 GiB.
   constexpr std::uint64_t kSegments = 1 << 16;
-  ClipRecord clip = uneven_clip(limits::kTicks);
-  clip.frame_count = kSegments * limits::kFramesPerSegment - 1;
+  ClipRecord clip = uneven_clip(limits::kTicks + 1);
+  clip.frame_count = kSegments * limits::kFramesPerSegment;
   Timeline timeline(clip);
   SegmentRecord segment;
   segment.frame_count = limits::kFramesPerSegment;
@@ -145,4 +145,23 @@ TEST_CASE("a segment that starts at the same tick takes the place of the other")
   CHECK(timeline.frame_at(3) == 3u);
   CHECK(timeline.frame_at(8) == 4u);
   CHECK_FALSE(timeline.frame_at(9));
+}
+
+TEST_CASE("frames that the clip does not have are not shown") {
+  Timeline timeline(uneven_clip(14));
+  SegmentRecord segment;
+  segment.first_frame = 1'409'286'144;
+  segment.frame_count = 2;
+  timeline.add(segment);
+  CHECK_FALSE(timeline.frame_at(0));
+  CHECK_FALSE(timeline.first_tick(1'409'286'144));
+  // Of a segment that reaches beyond, what lies before the end.
+  const std::uint64_t frames = uneven_clip(14).frame_count;
+  segment.first_frame = frames - 1;
+  segment.first_tick = 9;
+  segment.durations = {2, 3};
+  timeline.add(segment);
+  CHECK(timeline.frame_at(10) == frames - 1);
+  CHECK_FALSE(timeline.frame_at(11));
+  CHECK_FALSE(timeline.ticks_of(frames));
 }

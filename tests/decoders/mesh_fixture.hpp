@@ -29,12 +29,52 @@ inline std::vector<std::uint8_t> bytes_of(std::span<const std::uint16_t> words) 
   return out;
 }
 
-inline std::vector<std::uint8_t> vertex_bytes(std::span<const std::uint8_t> plain,
-                                              std::size_t stride) {
-  const std::size_t count = plain.size() / stride;
-  std::vector<std::uint8_t> coded(meshopt_encodeVertexBufferBound(count, stride));
-  coded.resize(meshopt_encodeVertexBuffer(coded.data(), coded.size(), plain.data(), count, stride));
-  return zstd(coded);
+/// FORMAT.md, section 3.6, for the four vertices of quad(): vertex 1 has 0 near, vertex 2 has 1 and
+/// the other corner 0, vertex 3 has 2, the other corner 0, and 1 across their edge.
+inline int quad_prediction(container::Semantic semantic, const std::vector<int>& values,
+                           std::size_t v, std::size_t c, std::size_t components) {
+  const auto at = [&](std::size_t vertex) { return values[vertex * components + c]; };
+  if (semantic == container::Semantic::kWeights && c == 3) {
+    return 255 - values[4 * v] - values[4 * v + 1] - values[4 * v + 2];
+  }
+  if (v == 0) return 0;
+  switch (semantic) {
+    case container::Semantic::kJoints:
+      return at(v - 1);
+    case container::Semantic::kNormal:
+    case container::Semantic::kColor:
+    case container::Semantic::kWeights:
+      return v == 1 ? at(0) : (at(v - 1) + at(0)) >> 1;
+    default:
+      return v == 3 ? at(2) + at(0) - at(1) : at(v - 1);
+  }
+}
+
+/// The bytes of a stream of quad(); those of a morph target are coded like a position's.
+inline std::vector<std::uint8_t> vertex_bytes(
+    std::span<const std::uint8_t> plain, std::size_t stride,
+    container::Semantic semantic = container::Semantic::kPosition) {
+  using container::Semantic;
+  const bool bytes = semantic == Semantic::kNormal || semantic == Semantic::kColor ||
+                     semantic == Semantic::kWeights;
+  const std::size_t components = bytes ? stride : stride / 2;
+  std::vector<int> values(4 * components);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    values[i] = bytes ? plain[i] : plain[2 * i] | plain[2 * i + 1] << 8;
+    if (semantic == Semantic::kNormal) values[i] = static_cast<std::int8_t>(values[i]);
+  }
+  std::vector<std::uint8_t> low(values.size()), high(bytes ? 0 : values.size());
+  for (std::size_t v = 0; v < 4; ++v) {
+    for (std::size_t c = 0; c < components; ++c) {
+      int r = values[v * components + c] - quad_prediction(semantic, values, v, c, components);
+      r = bytes ? int{static_cast<std::int8_t>(r)} : int{static_cast<std::int16_t>(r)};
+      const int folded = r >= 0 ? 2 * r : -2 * r - 1;
+      low[4 * c + v] = static_cast<std::uint8_t>(folded & 255);
+      if (!bytes) high[4 * c + v] = static_cast<std::uint8_t>(folded >> 8);
+    }
+  }
+  low.insert(low.end(), high.begin(), high.end());
+  return zstd(low);
 }
 
 inline std::vector<std::uint8_t> index_bytes(std::span<const std::uint32_t> indices,
@@ -49,7 +89,7 @@ inline container::VertexStream stream(container::Semantic semantic, std::uint8_t
                                       std::span<const std::uint8_t> plain,
                                       std::array<float, 3> offset = {},
                                       std::array<float, 3> scale = {1, 1, 1}) {
-  return {semantic, stride, offset, scale, vertex_bytes(plain, stride)};
+  return {semantic, stride, offset, scale, vertex_bytes(plain, stride, semantic)};
 }
 
 inline container::VertexStream stream(container::Semantic semantic, std::uint8_t stride,

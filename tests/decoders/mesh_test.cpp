@@ -43,6 +43,20 @@ MeshRecord morphed_quad() {
   return record;
 }
 
+/// The quad whose vertex 3 shares all but its UVs with an earlier vertex; `words` are those of the
+/// twin stream. What is stored for three points is written out by hand.
+MeshRecord quad_of_three_points(const std::vector<std::uint8_t>& words) {
+  MeshRecord record = test::quad(0);
+  // x of the points 0, 2, 2 and y of 0, 0, 4: 2 is 2 from its near vertex 0; 4 from its near vertex
+  // 1. Zeros in z, in the padding, and in the planes of high bytes.
+  std::vector<std::uint8_t> positions(24, 0);
+  positions[1] = 4;
+  positions[5] = 8;
+  find(record, Semantic::kPosition).bytes = test::zstd(positions);
+  record.streams.push_back({Semantic::kTwin, 2, {}, {1, 1, 1}, test::zstd(words)});
+  return record;
+}
+
 /// What decode_mesh promises of any success.
 void check_invariants(const Mesh& mesh, std::size_t palette) {
   for (const std::uint16_t i : mesh.indices) CHECK(i < mesh.positions.size());
@@ -133,6 +147,38 @@ TEST_CASE("decode_mesh unfolds octahedral normals") {
   for (std::size_t v = 0; v < 4; ++v) CHECK(glm::length(mesh->normals[v] - expected[v]) < 1e-6f);
 }
 
+TEST_CASE("decode_mesh gives twins everything but texture coordinates") {
+  // 3 is 2 more than the last twin (0 at first): folded 4, and 1 for having one.
+  const Result<Mesh> mesh = decode_mesh(quad_of_three_points({0, 0, 0, 5, 0, 0, 0, 0}), 0, 0);
+  REQUIRE(mesh);
+  CHECK(mesh->positions == std::vector<glm::vec3>{{1, 2, 3}, {2, 2, 3}, {2, 3, 3}, {2, 3, 3}});
+  CHECK(mesh->lightmap_uv == std::vector<glm::vec2>{{0, 0}, {1, 0}, {1, 1}, {0, 1}});
+}
+
+TEST_CASE("decode_mesh predicts points across the twins that stand for them") {
+  // Vertex 2 is vertex 0 once more, so the second triangle is (0, 0, 3) of points: 3 has 0 near it,
+  // twice, and nothing across. UVs do not know of twins.
+  MeshRecord record = quad_of_three_points({0, 0, 1, 0, 0, 0, 0, 0});
+  const Result<Mesh> mesh = decode_mesh(record, 0, 0);
+  REQUIRE(mesh);
+  CHECK(mesh->positions == std::vector<glm::vec3>{{1, 2, 3}, {2, 2, 3}, {1, 2, 3}, {1, 3, 3}});
+  CHECK(mesh->lightmap_uv == std::vector<glm::vec2>{{0, 0}, {1, 0}, {1, 1}, {0, 1}});
+}
+
+TEST_CASE("decode_mesh rejects twins that are not before their vertex") {
+  for (const std::uint8_t word : {std::uint8_t{7}, std::uint8_t{9}, std::uint8_t{2}}) {
+    CHECK(failure(quad_of_three_points({0, 0, 0, word, 0, 0, 0, 0}), 0, 0) == ErrorCode::kCorrupt);
+  }
+  CHECK(failure(quad_of_three_points({1, 0, 0, 0, 0, 0, 0, 0}), 0, 0) == ErrorCode::kCorrupt);
+  // Too few words, and a stream of four points where three are stored.
+  CHECK(failure(quad_of_three_points({0, 0, 0, 5}), 0, 0) == ErrorCode::kCorrupt);
+  MeshRecord record = quad_of_three_points({0, 0, 0, 0, 0, 0, 0, 0});
+  CHECK(failure(record, 0, 0) == ErrorCode::kCorrupt);
+  record = quad_of_three_points({0, 0, 0, 5, 0, 0, 0, 0});
+  record.streams.push_back(record.streams.back());
+  CHECK(failure(record, 0, 0) == ErrorCode::kCorrupt);
+}
+
 TEST_CASE("decode_mesh rejects indices and joints out of range") {
   MeshRecord record = test::quad();
   const std::vector<std::uint32_t> indices{0, 1, 2, 0, 2, 4};
@@ -172,7 +218,7 @@ TEST_CASE("decode_mesh rejects missing, repeated and misshapen streams") {
   stride.streams[0].stride = 12;
   CHECK(failure(stride) == ErrorCode::kCorrupt);
   MeshRecord unknown = test::quad();
-  unknown.streams[0].semantic = static_cast<Semantic>(7);
+  unknown.streams[0].semantic = static_cast<Semantic>(8);
   CHECK(failure(unknown) == ErrorCode::kUnsupported);
 }
 

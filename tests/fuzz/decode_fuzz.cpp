@@ -108,7 +108,7 @@ void edit_stream(VertexStream& stream, unsigned which, std::uint16_t value) {
   if (which % 2 == 0)
     stream.stride = static_cast<std::uint8_t>(value);
   else
-    stream.semantic = static_cast<Semantic>(value % 8);
+    stream.semantic = static_cast<Semantic>(value % 9);
 }
 
 void edit_mesh(MeshRecord& mesh, unsigned which, std::uint16_t value) {

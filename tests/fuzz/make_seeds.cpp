@@ -182,6 +182,10 @@ void add_meshes(Seeds& seeds) {
     const std::vector<std::uint16_t> offsets(16, 7);
     mesh.morph_targets = {{{0.5f, 0.25f, 0.125f}, test::vertex_bytes(test::bytes_of(offsets), 8)}};
     add_mesh(seeds, mesh, "full" + std::to_string(influences));
+    // No vertex has a twin, so that the other streams still fit.
+    const Bytes twins(8, 0);
+    mesh.streams.push_back({Semantic::kTwin, 2, {}, {1, 1, 1}, test::zstd(twins)});
+    add_mesh(seeds, mesh, "twins" + std::to_string(influences));
   }
 }
 

@@ -9,7 +9,7 @@
 
 /// Hostile meshes: a byte of flags, sizes of palette and morph weights, the payload of a MESH
 /// record. With flag 1 the streams stand uncompressed in the input, so that mutations reach
-/// meshoptimizer's decoders behind zstd.
+/// the prediction and meshoptimizer's index decoder behind zstd.
 namespace {
 
 using namespace relit;
