@@ -2,6 +2,7 @@
 #include "gles/compositor.hpp"
 
 #include <algorithm>
+#include <cfloat>
 #include <cmath>
 
 #include "gles/prediction.hpp"
@@ -198,7 +199,7 @@ double Compositor::sampled_peak(const FoldedLight& light, const FrameSlots& fram
     }
     peak = std::max({peak, sum[0], sum[1], sum[2]});
   }
-  return peak > 1e-30 ? kPeakMargin * peak : 1.0;
+  return peak > double{FLT_MIN} ? kPeakMargin * peak : 1.0;
 }
 
 // Without the constant.

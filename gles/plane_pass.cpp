@@ -10,6 +10,10 @@ namespace relit::gles {
 namespace {
 
 constexpr int kSumExponent = 6;
+// What a sum may reach: 2^127 is the largest value of a plane of scale 1, and half of what a float
+// holds is left for the margin over the peak of square roots. Below the least, 2^-120, everything
+// is black: normalised as it is there, with scales that are floats.
+constexpr double kLargestSum = 0x1p127, kLeastSum = 0x1p-120;
 
 bool is_finite(const Rgb& rgb) {
   return std::isfinite(rgb[0]) && std::isfinite(rgb[1]) && std::isfinite(rgb[2]);
@@ -227,10 +231,10 @@ Result<double> PlanePass::normalise(const FoldedLight& light, const FrameSlots& 
       !(frames.blend >= 0) || frames.blend > 1)
     return fail(ErrorCode::kInvalid, "frames that are not there, or a blend outside 0 to 1");
   const double largest = sum_bound(light, frames, sheets);
-  if (!(largest < 1e30))
+  if (!(largest <= kLargestSum))
     return fail(ErrorCode::kInvalid, "the planes' scales and exponents exceed the range of floats");
   int exponent = 0;
-  if (largest > 1e-30) std::frexp(largest, &exponent);
+  std::frexp(std::max(largest, kLeastSum), &exponent);
   return std::ldexp(1.0, exponent - kSumExponent);
 }
 

@@ -16,28 +16,6 @@ using namespace relit;
 using namespace relit::gles;
 using namespace relit::test;
 
-// As for the sum of planes (compositor_test.cpp), where a pass with half-float fragments adds 16 at
-// most. Besides, E(N) is by normals of 16 bits: a coordinate is off by ½/32767, N by √3 times that,
-// and Y_n changes by 1.9 of it at most (Y_6); s is at most 1. And a term of s · E(N) is rounded 17
-// times at most: its factor, N's coordinates (2 in degree 2), the polynomial's products and
-// difference (3), the product with the factor, 8 sums, s and its exponent, the product with it.
-double bound(const Device& device, double passes, const Scene::Reference& r,
-             const PredictedScene& scene, double frames = 1) {
-  double irradiance = 0;
-  for (std::size_t c = 0; c < 3; ++c) {
-    double sum = 0;
-    for (const Rgb& row : scene.light_.irradiance) sum += std::abs(double{row[c]});
-    irradiance = std::max(irradiance, sum);
-  }
-  const double normals = 1.9 * std::sqrt(3.0) * 0.5 / 32767 * irradiance;
-  const auto terms = frames * static_cast<double>(scene.model_planes_);
-  if (device.profile() != Profile::kEs2Mediump)
-    return passes * std::exp2(-10) * r.peak + (terms + 8 + 17) * std::exp2(-24) * r.absolute_sum +
-           normals;
-  return (std::min(terms, 16.0) + 4 + 17) * std::exp2(-11) * r.absolute_sum +
-         passes * std::exp2(-10) * r.absolute_sum + normals;
-}
-
 std::vector<float> read(Compositor& compositor, std::size_t size) {
   std::vector<float> values(size);
   require(compositor.read_back(values));
@@ -60,7 +38,7 @@ void check_frame(const char* name, const PredictedScene& scene) {
         largest_difference(read(*compositor, reference.values.size()), reference.values);
     std::printf("predicted %-36s %-17s %d pass(es): error/peak %.2e\n", name, backend.name,
                 compositor->pass_count(), error / reference.peak);
-    CHECK(error <= bound(device, compositor->pass_count(), reference, scene));
+    CHECK(error <= predicted_bound(device, compositor->pass_count(), reference, scene));
     CHECK(error <= required(device) * reference.peak);
   });
 }
@@ -148,7 +126,7 @@ TEST_CASE("a blend of two predicted frames takes each frame's normals", "[gles][
     const double error = largest_difference(read(*compositor, mixed.values.size()), mixed.values);
     std::printf("predicted blend %-17s %d pass(es): error/peak %.2e\n", backend.name,
                 compositor->blend_pass_count(), error / mixed.peak);
-    CHECK(error <= bound(device, compositor->blend_pass_count(), mixed, from, 2));
+    CHECK(error <= predicted_bound(device, compositor->blend_pass_count(), mixed, from, 2));
     CHECK(error <= required(device) * mixed.peak);
     take(compositor->composite(from.light_, {0, 1, 1}));
     CHECK(largest_difference(read(*compositor, b.values.size()), b.values) <=
@@ -167,7 +145,7 @@ TEST_CASE("a predicted light map of half size is every second texel", "[gles][es
     require(compositor->upload(scene.views_, 0));
     take(compositor->composite(scene.light_, {0, -1, 0}, true));
     CHECK(largest_difference(read(*compositor, expected.size()), expected) <=
-          bound(device, compositor->pass_count(), full, scene));
+          predicted_bound(device, compositor->pass_count(), full, scene));
   });
 }
 

@@ -84,8 +84,8 @@ class PredictedScene {
             static_cast<float>((samples_[c * normals_.size() + i] - 32768.0) / 32767);
   }
 
-  /// The same composite in double precision, by the normals that were not rounded to 16 bits.
-  [[nodiscard]] Scene::Reference reference() const {
+  /// The same composite on the CPU, by the normals that were not rounded to 16 bits; without `out`.
+  [[nodiscard]] decoders::CompositeJob job() const {
     decoders::CompositeJob job;
     job.planes = std::span(views_).first(model_planes_);
     job.light = light_;
@@ -93,7 +93,11 @@ class PredictedScene {
     job.width = width_;
     job.height = height_;
     job.predictions[0] = {0, normals_, 1};
-    reference::Composite composite = reference::composite(job);
+    return job;
+  }
+  /// And in double precision.
+  [[nodiscard]] Scene::Reference reference() const {
+    reference::Composite composite = reference::composite(job());
     Scene::Reference r;
     r.values = std::move(composite.value);
     for (const double v : r.values) r.peak = std::max(r.peak, std::abs(v));
@@ -119,5 +123,28 @@ class PredictedScene {
   std::vector<glm::vec3> normals_;
   std::vector<std::uint16_t> samples_;
 };
+
+/// How far a predicted composite may be from the reference. As for the sum of planes
+/// (compositor_test.cpp), where a pass with half-float fragments adds 16 at most. Besides, E(N) is
+/// by normals of 16 bits: a coordinate is off by ½/32767, N by √3 times that, and Y_n changes
+/// by 1.9 of it at most (Y_6); |s| is at most `most`. And a term of s · E(N) is rounded 17 times at
+/// most: its factor, N's coordinates (2 in degree 2), the polynomial's products and difference (3),
+/// the product with the factor, 8 sums, s and its exponent, the product with it.
+inline double predicted_bound(const gles::Device& device, double passes, const Scene::Reference& r,
+                              const PredictedScene& scene, double frames = 1, double most = 1) {
+  double irradiance = 0;
+  for (std::size_t c = 0; c < 3; ++c) {
+    double sum = 0;
+    for (const Rgb& row : scene.light_.irradiance) sum += std::abs(double{row[c]});
+    irradiance = std::max(irradiance, sum);
+  }
+  const double normals = most * 1.9 * std::sqrt(3.0) * 0.5 / 32767 * irradiance;
+  const auto terms = frames * static_cast<double>(scene.model_planes_);
+  if (device.profile() != gles::Profile::kEs2Mediump)
+    return passes * std::exp2(-10) * r.peak + (terms + 8 + 17) * std::exp2(-24) * r.absolute_sum +
+           normals;
+  return (std::min(terms, 16.0) + 4 + 17) * std::exp2(-11) * r.absolute_sum +
+         passes * std::exp2(-10) * r.absolute_sum + normals;
+}
 
 }  // namespace relit::test
