@@ -164,7 +164,7 @@ TEST_CASE("validator finds fields that break rules, exceed limits or are of late
       {"MESH_UNSUPPORTED",
        [](Pieces& p) {
          edit<MeshRecord>(p, "MESH", parse_mesh,
-                          [](auto& r) { r.streams[0].semantic = Semantic{7}; });
+                          [](auto& r) { r.streams[0].semantic = Semantic{8}; });
        }},
       {"SKEL_CORRUPT",
        [](Pieces& p) {
