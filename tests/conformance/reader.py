@@ -8,26 +8,26 @@ were lost). frames prints hashes of decoded planes, coefficients at probe texels
 import collections, contextlib, ctypes, ctypes.util, io, itertools, json, math, pathlib, re, struct
 import sys, zlib
 
-from reader_streams import *
-
 SIGNATURE, MARKER = b"\x89RLT\r\n\x1a\n", bytes.fromhex("F3529C0BE6D17A38C41FA9650EB2875D")
 # The static types behind HEAD in their order: names in INFO.md, and how many a file may have.
 STATIC = {"CLIP": ("clips", 1024), "IMAG": ("images", 4096), "MATL": ("materials", 4096),
           "MESH": ("meshes", 4096), "SKEL": ("skeleton", 1), "POSE": ("poses", 1024),
           "MODL": ("models", 256), "LAYR": ("layers", 256)}
 ORDER = ["HEAD", *STATIC, "SEGM", "INDX", "FEND"]
-
+class Refuse(ValueError): """The file, or a part of it, must not be used."""
 class Framing(Refuse): """The framing is lost at this place."""
+def need(condition, what, error=Refuse):
+    if not condition: raise error(what)
 
+def signed(zigzag): return zigzag >> 1 ^ -(zigzag & 1)
 def affine(offset, step, integers): return [o + k * i for o, k, i in zip(offset, step, integers)]
 def distinct(values): return len(set(values := list(values))) == len(values)
-
 # Payloads, section 4 ------------------------------------------------------------------------------
 # A layout lists fields as name:code, the code being one of struct's, string, bytes, bool, another
 # layout, or the names of enumerators, each behind a slash. Behind the code may stand
 #   [n] for a list of at most n entries;   *n or *field for so many without a count before them;
 #   =a..b for the least and the largest (of bytes: length);   ~regex for what a value must match;
-# and bool? before it, if the field exists only where the bool of that name is true.
+# and bool? before it, if the field exists only where that bool is true. Line ends and "; " end one.
 LAYOUTS = """
 HEAD version:2H reserved:I=0..0 writer:string
 CLIP id:I name:string tick_rate:2I=1..2147483647 frames:Q=1..4294967296
@@ -37,18 +37,14 @@ MATL id:I name:string base_color:4f=0..1 image:i=-1..2147483647 wrap:/repeat/cla
   linear_filter:bool alpha_mode:/opaque/mask/blend alpha_cutoff:f=0..inf
 MESH id:I name:string material:I vertices:I=1..65535 index_count:I=1..3145728 streams:stream[16]
   indices:bytes=1..inf first_morph_weight:I morph_targets:target[1024]
-stream semantic:/position/normal/lightmap_uv/albedo_uv/color/joints/weights/twin
-  stride:B
-  offset:3f scale:3f=0..inf data:bytes=1..inf
-target scale:3f=0..inf data:bytes=1..inf
+stream semantic:/position/normal/lightmap_uv/albedo_uv/color/joints/weights/twin stride:B
+  offset:3f scale:3f=0..inf data:bytes=1..inf; target scale:3f=0..inf data:bytes=1..inf
 SKEL morph_weights:I=0..65535 nodes:node[65535] palette:joint[65535]
-node parent:i=-1..65534 local:12f=-1e9..1e9
-joint node:I inverse_bind:12f=-1e9..1e9
+node parent:i=-1..65534 local:12f=-1e9..1e9; joint node:I inverse_bind:12f=-1e9..1e9
 POSE track:I clip:I kind:/joints/vertices rest:rest_pose[65535] channels:channel[262140]
   vertex_ranges:range[4096]
-rest_pose node:I translation:3f rotation:4f scale:3f
+rest_pose node:I translation:3f rotation:4f scale:3f; range mesh:I offset:3f step:3f=0..inf
 channel target:/translation/rotation/scale/morph_weight index:I offset:3f step:3f=0..inf
-range mesh:I offset:3f step:3f=0..inf
 MODL id:I clip:I kind:/shlm order:B=0..3 size:2H=1..4096 prediction_plane:i=-1..255 mean:3f[16]
 LAYR id:I model:I track:I codec:string~[a-z0-9_-]{1,32} codec_private:bytes=0..1048576
   coded:2H=1..16384 bit_depth:B~8|10 chroma:/luma/4:2:0/4:4:4 lossless:bool pictures:B=1..32
@@ -58,31 +54,27 @@ exponents track:I codec:string~[a-z0-9_-]{1,32} codec_private:bytes=0..1048576
 plane component:B=0..2 mantissa_rect:4H has_exponents?exponent_rect:4H scale:f matrix:BBf[48]
 SEGM marker:16B index:I=0..16777215 clip:I first_frame:Q frames:I=1..65536 first_tick:Q
   chunks:announced[1024] durations:I[65536]=1..inf
-announced track:I reserved:I=0..0 bytes:Q=56..inf
 CHNK track:I segment:I first_pts:Q count:I=1..131072 table_bytes:I
 INDX count:I=0..16777216 reserved:I=0..0 segments:place*count
 place index:I clip:I first_frame:Q frames:I reserved:I=0..0 first_tick:Q offset:Q
-FEND index_offset:Q copies_offset:Q file_bytes:Q
-"""
+announced track:I reserved:I=0..0 bytes:Q=56..inf; FEND index_offset:Q copies_offset:Q file_bytes:Q
+"""[1:-1].replace("\n  ", " ")
 FIELD = re.compile(r"(?:(\w+)\?)?(\w+):([\w/:]+)\[?(\d*)\]?\*?(\w*)(?:=(.+)\.\.(.+))?~?(.*)")
 FIELDS = {layout: [FIELD.fullmatch(field).groups() for field in fields]
-          for layout, *fields in map(str.split, LAYOUTS.replace("\n  ", " ").strip().split("\n"))}
+          for layout, *fields in map(str.split, re.split("; |\n", LAYOUTS))}
 
 class Payload(io.BytesIO):
     def take(self, n):
-        raw = self.read(n)
-        need(len(raw) == n, "shorter than its fields")
+        need(len(raw := self.read(n)) == n, "shorter than its fields")
         return raw
     def field(self, code, outer=()):
         if code in FIELDS: return self.record(code, outer)
         if code == "bytes": return self.take(self.field("I"))
         if code == "string":
-            raw = self.take(self.field("H"))
-            need(len(raw) <= 4096 and b"\0" not in raw, "a string beyond 4096 bytes or with U+0000")
+            need(len(raw := self.take(self.field("H"))) <= 4096 and b"\0" not in raw, "a string")
             return raw.decode("utf-8")
         if names := [False, True] if code == "bool" else code.split("/")[1:]:
-            n = self.field("B")
-            need(n < len(names), f"unsupported enumerator {n}")
+            need((n := self.field("B")) < len(names), f"unsupported enumerator {n}")
             return names[n]
         values = struct.unpack("<" + code, self.take(struct.calcsize("<" + code)))
         need(all(map(math.isfinite, values)), "a number that is not finite")
@@ -124,17 +116,14 @@ def planes_are_sound(layer):
             need(size == [-(-w // e["block"]), -(-h // e["block"])], "exponent_rect")
             need(x + size[0] <= e["coded"][0] and y + size[1] <= e["coded"][1], "exponent_rect")
     return layer["planes"]
-
 # What a layout does not show.
 SOUND = {
-    "HEAD": lambda d: d["version"][0] == 0 and d["version"][1] >= 2,
+    "LAYR": planes_are_sound, "HEAD": lambda d: d["version"][0] == 0 and d["version"][1] >= 2,
     "CLIP": lambda d: d["frames"] <= d["duration_ticks"] and all(map(float.__le__, *d["bounds"])),
     "MESH": lambda d: (n := collections.Counter(s["semantic"] for s in d["streams"])) and (
-        d["index_count"] % 3 == 0 and n["position"] == n["lightmap_uv"] == 1
-        and n["joints"] == n["weights"] <= 2
-        and max(n["normal"], n["albedo_uv"], n["color"], n["twin"]) <= 1),
-    "stream": lambda d: (
-        d["stride"] == {"position": 8, "joints": 8, "twin": 2}.get(d["semantic"], 4)),
+        d["index_count"] % 3 == 0 and n["joints"] == n["weights"] <= 2 and n["position"] == 1
+        == n["lightmap_uv"] >= max(n["normal"], n["albedo_uv"], n["color"], n["twin"])),
+    "stream": lambda d: d["stride"] == dict(twin=2, position=8, joints=8).get(d["semantic"], 4),
     "SKEL": lambda d: (all(n["parent"] < i for i, n in enumerate(d["nodes"]))
                        and all(joint["node"] < len(d["nodes"]) for joint in d["palette"])),
     "POSE": lambda d: distinct([r["node"] for r in d["rest"]]) and (
@@ -142,16 +131,14 @@ SOUND = {
         and not (d["rest"] + d["channels"] if d["kind"] == "vertices" else d["vertex_ranges"])),
     "rest_pose": lambda d: abs(math.hypot(*d["rotation"]) - 1) <= 1e-3,
     "MODL": lambda d: len(d["mean"]) == (d["order"] + 1) ** 2,
-    "LAYR": planes_are_sound,
     "plane": lambda d: (d["scale"] > 0 and distinct([(n, c) for n, c, _ in d["matrix"]])
                         and all(c < 3 for _, c, _ in d["matrix"])),
     "SEGM": lambda d: (bytes(d["marker"]) == MARKER and len(d["durations"]) in (0, d["frames"])
                        and d["first_tick"] + (sum(d["durations"]) or d["frames"]) <= 1 << 32
                        and distinct([c["track"] for c in d["chunks"]])),
-    "announced": lambda d: d["bytes"] % 8 == 0,
     "INDX": lambda d: all(a["index"] < b["index"] and a["offset"] < b["offset"]
                           for a, b in itertools.pairwise(d["segments"])),
-    "place": lambda d: d["offset"] % 8 == 0}
+    "announced": lambda d: d["bytes"] % 8 == 0, "place": lambda d: d["offset"] % 8 == 0}
 
 def check_references(s):
     """What section 7, step 3, asks for, and limits of several records. The clip of each track."""
@@ -192,10 +179,8 @@ def check_references(s):
         need(total <= 1 << 48 and total * num <= clip["duration_ticks"] * den << 33, "samples")
     need(distinct(p["clip"] for p in s["poses"]) and distinct(t for t, _ in tracks), "two users")
     return dict(tracks)
-
 # The file, sections 1 and 2 -----------------------------------------------------------------------
 Record = collections.namedtuple("Record", "offset flags type payload_bytes payload_crc body next")
-
 def record_at(data, at):
     """The record whose header is at this place. body: None if it or the padding is damaged."""
     need(8 <= at <= len(data) - 24, "no place for a record", Framing)
@@ -206,7 +191,6 @@ def record_at(data, at):
     need(length <= (278580 if kind == b"SEGM" else 1 << 30) and end <= len(data), "length", Framing)
     good = zlib.crc32(body) == crc and not any(data[at + 24 + length:end])
     return Record(at, flags, kind.decode(), length, crc, body if good else None, end)
-
 def varints(raw):               # all numbers of a table
     codes = re.findall(rb"[\x00-\x7f]|[\x80-\xff]{1,8}[\x01-\x7f]|[\x80-\xff]{9}\x01", raw)
     need(b"".join(codes) == raw, "not the shortest form, or beyond 64 bits")
@@ -227,10 +211,8 @@ class File:
         need(head.type == "HEAD" and not head.flags & 0xFFFF, "does not begin with HEAD")
         self.head, at = parse("HEAD", head.body), head.next
         while at < self.size and self.rank < ORDER.index("FEND"):
-            try:
-                at = self.step(at)
-            except Framing:
-                at = self.find_way_back(at)
+            try: at = self.step(at)
+            except Framing: at = self.find_way_back(at)
         self.lost.update(records=len(self.awaited) + (at < self.size), bytes=self.size - at)
         self.finish_static()
     def step(self, at):
@@ -254,12 +236,9 @@ class File:
         self.rank = rank
         if r.type in ("SEGM", "INDX", "FEND"): self.finish_static()
         try:
-            if r.type in STATIC:
-                self.static.append(r)
-            elif r.type == "SEGM":
-                self.segment(r)
-            elif r.type == "CHNK":
-                self.chunk(r)
+            if r.type in STATIC: self.static.append(r)
+            elif r.type == "SEGM": self.segment(r)
+            elif r.type == "CHNK": self.chunk(r)
             elif r.type == "INDX":
                 self.index_at, self.index = at, parse("INDX", r.body)["segments"]
             else:
@@ -326,32 +305,27 @@ class File:
         sizes, keys = [v >> 1 for v in table[::2]], [v & 1 for v in table[::2]]
         packets = [payload.take(n) for n in sizes]
         need(distinct(times) and not payload.read(1), "two packets of a time, or bytes behind them")
-        if self.tracks.get(d["track"]) == s["clip"]:
-            frames = range(s["first_frame"], s["first_frame"] + s["frames"])
-            need(keys[0] and times[0] == frames[0] and set(times) <= set(frames), "packets")
-        announced.update(packets=[*zip(times, keys, sizes)], data=b"".join(packets))
         first, end = s["first_frame"], s["first_frame"] + s["frames"]
+        if self.tracks.get(d["track"]) == s["clip"]:
+            need(keys[0] and times[0] == first <= min(times) <= max(times) < end, "packets")
+        announced.update(packets=[*zip(times, keys, sizes)], data=b"".join(packets))
         for t in [t for t in self.segments[:-1] if (t["index"], d["track"]) in self.packets]:
             if first == t["first_frame"]: del self.packets[t["index"], d["track"]]
             elif first < t["first_frame"] + t["frames"] and t["first_frame"] < end: return
-        times = [time - first for time in times]
-        self.packets[s["index"], d["track"]] = dict(zip(times, packets))
+        self.packets[s["index"], d["track"]] = {t - first: p for t, p in zip(times, packets)}
     def info(self):
         s, chunks = self.records, [c for segment in self.segments for c in segment["chunks"]]
         layers = [x for layer in s["layers"] for x in (layer, layer.get("exponents")) if x]
         for user in s["poses"] + layers:
             user["bytes"] = sum(c["bytes"] for c in chunks if c["track"] == user["track"])
-        for image in s["images"]:
-            image.update(bytes=len(image["data"]), crc32=zlib.crc32(image["data"]))
+        for i in s["images"]: i.update(bytes=len(i["data"]), crc32=zlib.crc32(i["data"]))
         return {**self.head, **s, "bytes": self.size, "complete": bool(self.end), "lost": self.lost,
                 "repaired": self.repaired, "segments": self.segments, "index": self.index,
                 "end": self.end, "passed_over": self.passed}
-
 # Video, sections 3.3 and 3.4 ----------------------------------------------------------------------
 # libavcodec decodes; fields of its structures lie, in bytes, where versions from 59 on have them.
 class Pointer(ctypes.c_void_p):
     def at(self, offset, kind=ctypes.c_int): return kind.from_address(self.value + offset).value
-
 AV, memory = ctypes.CDLL(ctypes.util.find_library("avcodec")), ctypes.create_string_buffer
 for function in (AV.avcodec_descriptor_get_by_name, AV.avcodec_find_decoder, AV.av_frame_alloc,
                  AV.avcodec_alloc_context3): function.restype = Pointer
@@ -361,7 +335,6 @@ OPTIONS = b"threads 1, err_detect crccheck+explode, ec 0, idct simple, flags bit
 FORMATS = {b"gray": ("luma", [(0, 0, 1, 1)]), b"bgr0": ("4:4:4", [(0, i, 4, 1) for i in (1, 0, 2)]),
            b"yuv420p": ("4:2:0", [(0, 0, 1, 1), (1, 0, 1, 2), (2, 0, 1, 2)]),
            **dict.fromkeys((b"yuv444p", b"gbrp"), ("4:4:4", [(i, 0, 1, 1) for i in range(3)]))}
-
 def open_decoder(track):
     kind = AV.avcodec_descriptor_get_by_name(track["codec"].encode())
     need(kind and (codec := AV.avcodec_find_decoder(kind.at(0))), f"no decoder: {track['codec']}")
@@ -450,37 +423,84 @@ def show_model(file, model, count):
             if any(planes):
                 shown[i] = {"planes": [p and p[0] for p in planes], "coefficients": texels}
     return {"model": model["id"], "clip": model["clip"], "probe_texels": probes, "frames": shown}
-
 # Meshes and poses, sections 3.5 and 3.6 -----------------------------------------------------------
 def bounded(offset, step, top=65535, limit=1e9):
     need(all(abs(o) <= limit and abs(o + k * top) <= limit for o, k in zip(offset, step)), "bounds")
+def unzstd(raw, least, most):
+    """The one zstd frame in raw, which states a size between these."""
+    z, length = ctypes.CDLL("libzstd.so.1"), ctypes.c_size_t(len(raw))
+    z.ZSTD_getFrameContentSize.restype = ctypes.c_ulonglong
+    size = z.ZSTD_getFrameContentSize(raw, length)
+    need(least <= size <= most and z.ZSTD_findFrameCompressedSize(raw, length) == len(raw), "zstd")
+    out = memory(size)
+    need(z.ZSTD_decompress(out, ctypes.c_size_t(size), raw, length) == size, "zstd: damaged")
+    return out.raw
+def words(raw):                 # whose low bytes stand before their high bytes
+    return [low | high << 8 for low, high in zip(raw, raw[len(raw) // 2:])]
+
+def read_triangles(raw, count):
+    raw, out, size = unzstd(raw, 1, 8 * count + 4096), memory(4 * count), ctypes.c_size_t
+    call = ctypes.CDLL("libmeshoptimizer.so").meshopt_decodeIndexBuffer
+    need(raw[0] == 0xE1 and not call(out, size(count), size(4), raw, size(len(raw))), "indices")
+    return list(struct.iter_unpack("<3I", out.raw))
+def read_twins(raw, count):     # of those vertices that have one
+    twins, last = {}, 0
+    for v, word in enumerate(words(unzstd(raw, 2 * count, 2 * count))):
+        if word: twins[v] = last = last + signed(word - 1) & 0xFFFF
+        need(last < v or not word, "a twin that is not before its vertex")
+    return twins
+def neighbours(triangles, count):
+    """Near, other and far of each vertex. Where there is none, near stands for other and other for
+    far: what is predicted is near then."""
+    found = {}
+    for i, triangle in enumerate(triangles):
+        for v in triangle:
+            if v in found or v == min(triangle): continue
+            other, near = ([u for u in sorted(triangle) if u < v] * 2)[:2]
+            third = [sum(t) - near - other for t in triangles[max(0, i - 16):i]
+                     if near in t and other in t and near != other]
+            found[v] = near, other, third[-1] if third and third[-1] < v else other
+    return [found.get(v, [v - 1] * 3) for v in range(count)]
+# Of semantics the bits of a component, and what makes signed ones positive; else 16 and 0.
+CODINGS = {"normal": (8, 128), "color": (8, 0), "weights": (8, 0), "target": (16, 32768)}
+def read_stream(raw, semantic, stride, twins, links):   # the components of each vertex
+    (bits, half), stored = CODINGS.get(semantic, (16, 0)), len(links) - len(twins)
+    raw = unzstd(raw, stride * stored, stride * stored)
+    folded, row, values = words(raw) if bits == 16 else raw, itertools.count(), []
+    for v, link in enumerate(links):
+        now, sources = [], [values[u] if v else itertools.repeat(0) for u in link]
+        residuals = () if v in twins else folded[next(row)::stored]
+        for r, near, other, far in zip(residuals, *sources):
+            guess = near + other - far if bits == 16 else (near + other) // 2
+            if semantic == "joints": guess = near
+            if semantic == "weights" and len(now) == 3: guess = 255 - sum(now)
+            now.append((guess + signed(r) + half) % (1 << bits) - half)
+        values.append(now or values[twins[v]])
+    return values
 
 def open_mesh(mesh, palette):
     """First four vertices: (position, morph deltas, [(palette entry, weight)]); checks all."""
-    count, streams = mesh["vertices"], collections.defaultdict(list)
-    corners = meshopt_indices(mesh["indices"], mesh["index_count"])
-    need(max(corners) < count, "an index too large")
-    twins, points, none = [None] * count, [], [None] * count
-    for s in mesh["streams"]:
-        if s["semantic"] == "twin": twins = read_twins(s["data"], count)
-    for v, twin in enumerate(twins): points.append(v if twin is None else points[twin])
-    of_vertices = neighbours(corners, count)
-    of_points = neighbours([points[v] for v in corners], count)
+    count, streams, points = mesh["vertices"], collections.defaultdict(list), []
+    triangles = read_triangles(mesh["indices"], mesh["index_count"])
+    need(max(map(max, triangles)) < count, "an index too large")
+    twins = [s["data"] for s in mesh["streams"] if s["semantic"] == "twin"]
+    twins = read_twins(twins[0], count) if twins else {}
+    for v in range(count): points.append(points[twins[v]] if v in twins else v)
+    by_vertex = {}, neighbours(triangles, count)
+    by_point = twins, neighbours([[points[v] for v in t] for t in triangles], count)
     for s in mesh["streams"]:
         axes = {"position": 3, "lightmap_uv": 2, "albedo_uv": 2}.get(s["semantic"], 0)
         bounded(s["offset"][:axes], s["scale"])
-        if s["semantic"] == "twin": continue
-        links = (none, of_vertices) if "uv" in s["semantic"] else (twins, of_points)
-        values = read_stream(s["data"], s["semantic"], s["stride"], *links)
-        streams[s["semantic"]].append(values)
+        if s["semantic"] != "twin":
+            links = by_vertex if axes == 2 else by_point
+            streams[s["semantic"]] += [read_stream(s["data"], s["semantic"], s["stride"], *links)]
         if s["semantic"] == "position":
-            positions = [affine(s["offset"], s["scale"], v) for v in values[:4]]
+            positions = [affine(s["offset"], s["scale"], v) for v in streams["position"][0][:4]]
     need(all(max(v) < palette for s in streams["joints"] for v in s), "joint beyond the palette")
     need(all(sum(map(sum, v)) == 255 for v in zip(*streams["weights"])), "weights are not 255")
-    targets = [(t["scale"], read_stream(t["data"], "target", 8, twins, of_points))
+    targets = [(t["scale"], read_stream(t["data"], "target", 8, *by_point))
                for t in mesh["morph_targets"]]
-    return [(p, [affine((0, 0, 0), scale, [(x ^ 0x8000) - 0x8000 for x in values[i]])
-                 for scale, values in targets],
+    return [(p, [affine((0, 0, 0), scale, values[i]) for scale, values in targets],
              [pair for joints, weights in zip(streams["joints"], streams["weights"])
               for pair in zip(joints[i], weights[i]) if pair[1]])
             for i, p in enumerate(positions)]
@@ -488,10 +508,8 @@ def open_mesh(mesh, palette):
 def product(a, b):              # of row-major 3×4 matrices
     return [sum(a[r + k] * b[4 * k + c] for k in range(3)) + (a[r + 3] if c == 3 else 0)
             for r in (0, 4, 8) for c in range(4)]
-
 def trs(translation=(0, 0, 0), rotation=(0, 0, 0, 1), scale=(1, 1, 1), **_):
-    length = math.hypot(*rotation) or 1
-    x, y, z, w = (v / length for v in rotation)
+    x, y, z, w = (v / (math.hypot(*rotation) or 1) for v in rotation)
     turn = [[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
             [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
             [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]]
@@ -503,7 +521,7 @@ def unpack_pose(raw, count, frames, vertices):
     raw = unzstd(raw, 1 + 2 * n, min(1 + 2 * n, 1 << 30))
     order, along = raw[0] & 3, raw[0] >> 2
     need(order < 3 and along <= vertices, "pose: mode")
-    residuals = [signed(low | high << 8) for low, high in zip(raw[1:1 + n], raw[1 + n:])]
+    residuals = [signed(word) for word in words(raw[1:])]
     last = before = [0] * count
     for t in range(frames):
         guess, now = [(0, a, 2 * a - b)[min(order, t)] for a, b in zip(last, before)], []
@@ -512,10 +530,8 @@ def unpack_pose(raw, count, frames, vertices):
             now.append(guess[v] + off + r & 0xFFFF)
         before, last = last, now
         yield now
-
 # Values of a channel, their largest integer, and the bound of what they stand for.
 LIMITS = {"rotation": (3, 32767, 1e9), "morph_weight": (1, 65535, 1e6)}
-
 def read_channel(c, values):
     words = list(itertools.islice(values, LIMITS.get(c["target"], (3,))[0]))
     if c["target"] != "rotation": return affine(c["offset"], c["step"], words)
@@ -533,10 +549,9 @@ def pose_frame(s, pose, meshes, values):
     if pose["kind"] == "vertices": return result
     parts, world = {r["node"]: dict(r) for r in pose["rest"]}, []
     for c in pose["channels"]:
-        if c["target"] == "morph_weight":
-            weights[c["index"]] = read_channel(c, values)[0]
-        else:
-            parts.setdefault(c["index"], {})[c["target"]] = read_channel(c, values)
+        value = read_channel(c, values)
+        if c["target"] == "morph_weight": weights[c["index"]] = value[0]
+        else: parts.setdefault(c["index"], {})[c["target"]] = value
     for i, node in enumerate(s["skeleton"]["nodes"]):
         local = trs(**parts[i]) if i in parts else node["local"]
         world.append(local if node["parent"] < 0 else product(world[node["parent"]], local))
@@ -556,8 +571,7 @@ def show_pose(file, pose, meshes, count):
     parts = [(c, *LIMITS.get(c["target"], (3, 65535, 1e9))) for c in pose["channels"]]
     parts += [(r, 3 * m["vertices"], 65535, 1e9)
               for r, m in zip(pose["vertex_ranges"], file.records["meshes"])]
-    for c, n, top, limit in parts:
-        bounded(c["offset"][:n], c["step"], top, limit)
+    for c, n, top, limit in parts: bounded(c["offset"][:n], c["step"], top, limit)
     shown, total = [None] * count, sum(n for _, n, _, _ in parts)
     for s in (s for s in file.segments if s["clip"] == pose["clip"]):
         packet, at = file.packets.get((s["index"], pose["track"]), {0: b""})[0], s["first_frame"]
@@ -569,11 +583,10 @@ def show_pose(file, pose, meshes, count):
     return {"clip": pose["clip"], "vertices": shown}
 
 def show(file):
-    s, counts = file.records, {c["id"]: c["frames"] for c in file.records["clips"]}
+    s, count = file.records, {c["id"]: c["frames"] for c in file.records["clips"]}
     meshes = [open_mesh(m, len(s["skeleton"]["palette"])) for m in s["meshes"]]
-    return {"hash": "crc32",
-            "models": [show_model(file, m, counts[m["clip"]]) for m in s["models"]],
-            "poses": [show_pose(file, p, meshes, counts[p["clip"]]) for p in s["poses"]]}
+    return {"hash": "crc32", "models": [show_model(file, m, count[m["clip"]]) for m in s["models"]],
+            "poses": [show_pose(file, p, meshes, count[p["clip"]]) for p in s["poses"]]}
 
 def main():
     if len(sys.argv) != 3 or sys.argv[1] not in ("info", "frames"): sys.exit(__doc__)
@@ -584,5 +597,4 @@ def main():
     except (ValueError, OSError) as error:
         sys.exit(f"{sys.argv[2]}: {str(error)!r}")
     return 3 if file.lost["records"] and sys.argv[1] == "info" else 0
-
 if __name__ == "__main__": sys.exit(main())
