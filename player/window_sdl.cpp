@@ -273,6 +273,7 @@ Status Window::show() {
   } else {
     device_->gl().ClearColor(0.1f, 0.1f, 0.1f, 1);
     device_->gl().Clear(GL_COLOR_BUFFER_BIT);
+    session_->draw_nothing();
   }
   draw_overlay_model(now);
   RELIT_TRY(overlay_->draw(canvas_));

@@ -52,6 +52,8 @@ class WindowSession {
   [[nodiscard]] bool changed() const { return changed_; }
   /// Draws the picture, without overlay, into the framebuffer that is bound. Requires ready().
   Status draw(int width, int height);
+  /// In its place before ready(): the background is all that there is, until something changes.
+  void draw_nothing() { changed_ = false; }
   /// Shows a message for a while.
   void say(std::string text, bool is_error = false);
 
