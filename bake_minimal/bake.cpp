@@ -46,6 +46,7 @@ class Bake {
     if (!options_.reference.empty()) RELIT_TRY(check_output(options_.reference));
     RELIT_ASSIGN(prepared_, prepare_bake(options_));
     summarize();
+    RELIT_TRY(check_steps());
     RELIT_TRY(trace());
     std::optional<decoders::NpyWriter> reference;
     if (!options_.reference.empty()) {
@@ -78,11 +79,12 @@ class Bake {
   Result<CodingOptions> choose(const BakeOutput& output);
   Result<CodingTrial> try_coding(RangeScan scan);
   [[nodiscard]] ModelIds ids() const;
-  Result<CodingOptions> resolved(const CodingOptions& options) const;
+  Result<CodingOptions> resolved(const CodingOptions& options);
   Result<const RangeScan*> scan_for(const CodingOptions& options);
   Result<RangeScan> scan_range(const CodingOptions& options);
   Result<decoders::NpyWriter> write_reference();  // not committed
   Result<Timeline*> timeline(int step);
+  Status check_steps();
   Result<TransferFrame> fill_frame(Timeline& frames, std::uint64_t frame);  // of those kept
   Status score(Timeline& frames, const PlaneEncoder& encoder, decoders::PlaneDecoder& decoder,
                decoders::RelitError& error);
@@ -223,6 +225,14 @@ Result<Bake::Timeline*> Bake::timeline(int step) {
   return &(timelines_[step] = Timeline{std::move(kept), nullptr});
 }
 
+// A step that does not fit the clip should be known before an hour of tracing, too.
+Status Bake::check_steps() {
+  for (const BakeOutput& output : outputs_of(options_))
+    for (const CodingVariant& each : output.candidates)
+      RELIT_TRY(timeline(std::max(each.coding.frame_step, 1)));
+  return {};
+}
+
 Result<TransferFrame> Bake::fill_frame(Timeline& frames, std::uint64_t frame) {
   fill_transfer(frame * static_cast<std::uint64_t>(frames.kept.step));
   TransferFrame filled{filled_};
@@ -318,10 +328,10 @@ ModelIds Bake::ids() const {
   return ids;
 }
 
-Result<CodingOptions> Bake::resolved(const CodingOptions& options) const {
+Result<CodingOptions> Bake::resolved(const CodingOptions& options) {
   CodingOptions coding = options;
-  const auto step = static_cast<std::uint32_t>(std::max(options.frame_step, 1));
-  coding.segment_frames = static_cast<int>(std::max(prepared_.segment_frames / step, 1u));
+  RELIT_ASSIGN(const Timeline* const frames, timeline(std::max(options.frame_step, 1)));
+  coding.segment_frames = static_cast<int>(frames->kept.segment_frames);
   coding.threads = thread_count(options_.transfer.threads);
   return resolve(coding);
 }

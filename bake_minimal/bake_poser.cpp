@@ -73,18 +73,18 @@ Result<double> blended_pose_error(const PreparedBake& prepared, const KeptFrames
   RELIT_ASSIGN(const decoders::PoseTrack track, pose_track(prepared));
   RELIT_ASSIGN(const decoders::PoseTrack coarse,
                pose_track(prepared.packed, kept.pose, kept.count, kept.segment_frames, meshes));
-  decoders::Pose pose;
+  decoders::Pose true_pose, blended_pose;
   std::vector<glm::vec3> truth, blended;
   glm::vec3 low(std::numeric_limits<float>::infinity()), high(-low);
   double squares = 0, points = 0;
   const std::uint64_t last = (kept.count - 1) * static_cast<std::uint64_t>(kept.step);
   for (std::uint64_t k = 0; k <= last; ++k) {
+    RELIT_TRY(track.sample(static_cast<double>(k), true_pose));
+    RELIT_TRY(coarse.sample(static_cast<double>(k) / kept.step, blended_pose));
     for (std::size_t m = 0; m < meshes.size(); ++m) {
       truth.resize(meshes[m].positions.size()), blended.resize(truth.size());
-      RELIT_TRY(track.sample(static_cast<double>(k), pose));
-      decoders::pose_mesh(meshes[m], m, pose, truth, {});
-      RELIT_TRY(coarse.sample(static_cast<double>(k) / kept.step, pose));
-      decoders::pose_mesh(meshes[m], m, pose, blended, {});
+      decoders::pose_mesh(meshes[m], m, true_pose, truth, {});
+      decoders::pose_mesh(meshes[m], m, blended_pose, blended, {});
       for (std::size_t v = 0; v < truth.size(); ++v) {
         low = glm::min(low, truth[v]), high = glm::max(high, truth[v]);
         if (k % static_cast<std::uint64_t>(kept.step) == 0) continue;
