@@ -19,34 +19,6 @@ namespace {
 
 constexpr int kSide = 32;
 
-/// A quad over the whole picture, a pixel for each texel of the light map.
-struct Stage {
-  explicit Stage(const Device& device)
-      : framebuffer(take(Framebuffer::create(device, {kSide, kSide, 1}))),
-        renderer(take(CharacterRenderer::create(device))) {
-    const Quad quad;
-    const MeshView mesh = quad.view();
-    const MaterialView material;
-    require(renderer->set_materials({}, std::span(&material, 1)));
-    require(renderer->set_meshes(std::span(&mesh, 1)));
-    require(renderer->update_positions(0, quad.positions));
-  }
-  template <class Light>
-  Picture draw(Light& light, double exposure) {
-    View view;
-    view.width = view.height = kSide;
-    view.exposure = static_cast<float>(exposure);
-    framebuffer.bind();
-    require(renderer->draw(view, light));
-    require(framebuffer.resolve());
-    Picture picture{kSide, kSide, std::vector<std::uint8_t>(4 * kSide * kSide)};
-    require(framebuffer.read_back(picture.rgba));
-    return picture;
-  }
-  Framebuffer framebuffer;
-  std::unique_ptr<CharacterRenderer> renderer;
-};
-
 /// The interval in which a texel's radiance may lie.
 struct Interval {
   double least = 0;
@@ -121,7 +93,7 @@ void hold_exposures(LightMapFormat format, const std::string& name) {
     const double step = std::exp2(-24) * static_cast<double>(map.magnitude) *
                         (map.square_root ? 0.0 : static_cast<double>(map.scale));
     const bool half = device.profile() == Profile::kEs2Mediump;
-    Stage stage(device);
+    QuadStage stage(device, Quad(), kSide);  // a pixel for each texel
     for (Exposure& each : exposures) {
       // At 0 EV what is twice the largest transfer of one coefficient is white.
       const double exposure = 0.5 * std::exp2(each.ev);
@@ -186,7 +158,7 @@ TEST_CASE("the fused sum is drawn as the reference for every order") {
         require(compositor->upload(clip.views_, 0));
         const decoders::FoldedWeights folded = clip.fold(light);
         FusedLight& fused = *take(compositor->fuse(folded.view, {0, -1, 0}));
-        Stage stage(device);
+        QuadStage stage(device, Quad(), kSide);  // a pixel for each texel
         const Picture picture = stage.draw(fused, exposure);
         const auto interval = [&](const LitClip::Term& term) {
           // No target in between: the sum of four taps, whose shares are rounded and sum to 1.

@@ -4,10 +4,13 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <memory>
+#include <span>
 #include <vector>
 
 #include "gles/character_renderer.hpp"
 #include "gles/picture.hpp"
+#include "tests/results.hpp"
 
 /// What the drawing tests share: a quad, a constant light map, pictures to look into.
 namespace relit::test {
@@ -45,6 +48,36 @@ struct Quad {
   std::vector<glm::vec2> albedo_uv;
   std::vector<glm::u8vec4> colors;
   std::vector<std::uint16_t> indices{0, 1, 2, 0, 2, 3};
+};
+
+/// A quad and a square framebuffer that sees it, of `side` pixels and one sample.
+struct QuadStage {
+  QuadStage(const gles::Device& device, const Quad& quad, int side_pixels)
+      : side(side_pixels),
+        framebuffer(take(gles::Framebuffer::create(device, {side, side, 1}))),
+        renderer(take(gles::CharacterRenderer::create(device))) {
+    const gles::MeshView mesh = quad.view();
+    const gles::MaterialView material;
+    require(renderer->set_materials({}, std::span(&material, 1)));
+    require(renderer->set_meshes(std::span(&mesh, 1)));
+    require(renderer->update_positions(0, quad.positions));
+  }
+  template <class Light>
+  Picture draw(Light& light, double exposure = 1) {
+    gles::View view;
+    view.width = view.height = side;
+    view.exposure = static_cast<float>(exposure);
+    framebuffer.bind();
+    require(renderer->draw(view, light));
+    require(framebuffer.resolve());
+    Picture picture{side, side,
+                    std::vector<std::uint8_t>(4 * static_cast<std::size_t>(side * side))};
+    require(framebuffer.read_back(picture.rgba));
+    return picture;
+  }
+  int side;
+  gles::Framebuffer framebuffer;
+  std::unique_ptr<gles::CharacterRenderer> renderer;
 };
 
 /// [3][height][width] of one colour.

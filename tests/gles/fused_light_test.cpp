@@ -40,32 +40,11 @@ Scene tame_scene(const Case& c) {
 }
 
 // A quad whose coordinates run past the light map's edges, seen as large as the picture or smaller.
-struct Stage {
-  Stage(const Device& device, float half)
-      : framebuffer(take(Framebuffer::create(device, {kSide, kSide, 1}))),
-        renderer(take(CharacterRenderer::create(device))) {
-    Quad quad(1, half);
-    quad.uv = {{-0.1f, 1.1f}, {1.1f, 1.1f}, {1.1f, -0.1f}, {-0.1f, -0.1f}};
-    const MeshView mesh = quad.view();
-    const MaterialView material;
-    require(renderer->set_materials({}, std::span(&material, 1)));
-    require(renderer->set_meshes(std::span(&mesh, 1)));
-    require(renderer->update_positions(0, quad.positions));
-  }
-  template <class Light>
-  std::vector<std::uint8_t> draw(Light& light) {
-    View view;
-    view.width = view.height = kSide;
-    framebuffer.bind();
-    require(renderer->draw(view, light));
-    require(framebuffer.resolve());
-    std::vector<std::uint8_t> rgba(4 * kSide * kSide);
-    require(framebuffer.read_back(rgba));
-    return rgba;
-  }
-  Framebuffer framebuffer;
-  std::unique_ptr<CharacterRenderer> renderer;
-};
+Quad beyond_the_edges(float half) {
+  Quad quad(1, half);
+  quad.uv = {{-0.1f, 1.1f}, {1.1f, 1.1f}, {1.1f, -0.1f}, {-0.1f, -0.1f}};
+  return quad;
+}
 
 int largest_step(const std::vector<std::uint8_t>& a, const std::vector<std::uint8_t>& b) {
   int most = 0;
@@ -92,12 +71,12 @@ void check_scenes(const char* name, const AnyScene& from, const AnyScene& to) {
       return;
     }
     for (const float half : {1.0f, 0.2f}) {
-      Stage stage(device, half);
+      QuadStage stage(device, beyond_the_edges(half), kSide);
       for (const FrameSlots& frames : {FrameSlots{0, -1, 0}, FrameSlots{1, 0, 0.4f}}) {
         LightMap map = take(compositor->composite(from.light_, frames));
-        const std::vector<std::uint8_t> expected = stage.draw(map);
+        const std::vector<std::uint8_t> expected = stage.draw(map).rgba;
         FusedLight& fused = *take(compositor->fuse(from.light_, frames));
-        const std::vector<std::uint8_t> picture = stage.draw(fused);
+        const std::vector<std::uint8_t> picture = stage.draw(fused).rgba;
         const int step = largest_step(picture, expected);
         std::printf("fused %-32s %-9s half %.1f blend %.1f: at most %d level(s) apart\n", name,
                     backend.name, static_cast<double>(half), static_cast<double>(frames.blend),
@@ -142,20 +121,20 @@ TEST_CASE("a fused light with another light needs no new program", "[gles][es2]"
     if (device.profile() == Profile::kEs2Mediump) return;
     auto compositor = take(Compositor::create(device, scene.description_));
     require(compositor->upload(scene.views_, 0));
-    Stage stage(device, 1);
-    const auto first = stage.draw(*take(compositor->fuse(scene.light_, {0, -1, 0})));
+    QuadStage stage(device, beyond_the_edges(1), kSide);
+    const auto first = stage.draw(*take(compositor->fuse(scene.light_, {0, -1, 0}))).rgba;
     FoldedLight turned = scene.light_;
     std::vector<Rgb> weights = scene.weights_;
     std::reverse(weights.begin(), weights.end());
     turned.weights = weights;
-    const auto second = stage.draw(*take(compositor->fuse(turned, {0, -1, 0})));
+    const auto second = stage.draw(*take(compositor->fuse(turned, {0, -1, 0}))).rgba;
     CHECK(largest_step(first, second) > 3);
     LightMap map = take(compositor->composite(turned, {0, -1, 0}));
-    CHECK(largest_step(second, stage.draw(map)) <= kOneLevel);
+    CHECK(largest_step(second, stage.draw(map).rgba) <= kOneLevel);
     // Without any plane the constant is left.
     std::vector<Rgb> none(weights.size());
     turned.weights = none;
-    const auto plain = stage.draw(*take(compositor->fuse(turned, {0, -1, 0})));
+    const auto plain = stage.draw(*take(compositor->fuse(turned, {0, -1, 0}))).rgba;
     const std::size_t centre = 4 * (kSide * kSide / 2 + kSide / 2);
     CHECK(std::abs(plain[centre] - encode_srgb(0.6)) <= 1.01);
     CHECK(std::abs(plain[centre + 2] - encode_srgb(0.5)) <= 1.01);
